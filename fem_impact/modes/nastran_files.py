@@ -4,6 +4,7 @@ Needs pyNastran; runs in the reader process (see `isolated`).
 """
 
 import contextlib
+import re
 import tempfile
 import warnings
 from pathlib import Path
@@ -19,7 +20,7 @@ ELEMENTS = {
     "CQUAD4": (9, 4), "CQUAD8": (9, 4), "CQUADR": (9, 4), "CTETRA": (10, 4), "CHEXA": (12, 8), "CPENTA": (13, 6),
     "CPYRAM": (14, 5),
 }  # fmt: skip
-FREE = "BEGIN BULK"  # line of a deck above which other sections are
+FREE = re.compile(r"^\s*BEGIN\s+BULK", re.MULTILINE | re.IGNORECASE)  # line of a deck above which other sections are
 
 
 def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
@@ -58,9 +59,13 @@ def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
         place = np.where(told, np.cumsum(told) - 1, -1)
         fields |= {name: fields[name][told] for name in ("numbers", "nodes", "shapes", "static")}
         fields["cells"] = place[fields["cells"][told[fields["cells"]].all(axis=1)]]
-        masses = [np.asarray(one.generalized_mass, float) for one in found.eigenvalues.values()]
-        if masses and sum(map(len, masses)) >= len(frequencies):
-            fields["modal_mass"] = np.concatenate(masses)[: len(frequencies)]
+        told_masses = [
+            dict(zip(one.mode.tolist(), one.generalized_mass.tolist())) for one in found.eigenvalues.values()
+        ]
+        if len(told_masses) == len(table):  # of all modes, of which a set may be written
+            pairs = [(mass, mode) for mass, one in zip(told_masses, table) for mode in np.asarray(one.modes).tolist()]
+            if all(mode in mass for mass, mode in pairs):
+                fields["modal_mass"] = np.array([mass[mode] for mass, mode in pairs], float)
     return fields
 
 
@@ -123,8 +128,14 @@ def _quiet() -> Any:
 def _deck(path: Path, quiet: dict[str, Any]) -> Any:
     from pyNastran.bdf.bdf import read_bdf
 
-    bulk = FREE not in path.read_text("utf-8", "replace").upper()
-    return read_bdf(str(path), xref=False, validate=False, punch=bulk, **quiet)
+    bulk = not FREE.search(path.read_text("utf-8", "replace"))
+    model = read_bdf(str(path), xref=False, validate=False, punch=bulk, **quiet)
+    if model.grdset and (model.grdset.cp or model.grdset.cd):
+        raise ValueError(f"{path.name} names coordinate systems in GRDSET; write them to each GRID")
+    for name in {"CK2", "CM2"} & model.params.keys():
+        if model.params[name].values != [1.0]:
+            raise ValueError(f"{path.name} scales matrices by PARAM {name}; write them as they are meant, without it")
+    return model
 
 
 def _components(card: Any) -> list[tuple[int, str]]:

@@ -73,7 +73,9 @@ def med(path: Path) -> dict[str, np.ndarray]:
     static: list[np.ndarray] = []
     frequencies: list[float] = []
     with closed_hdf5(path), h5py.File(path) as file:
-        for _, field in sorted(file["CHA"].items() if "CHA" in file else ()):
+        for title, field in sorted(file["CHA"].items() if "CHA" in file else ()):
+            if re.search(r"(REAC_NODA|FORC_NODA|VITE|ACCE)[_\s]*$", title):  # forces and velocities along DX, DY, DZ
+                continue
             named = field.attrs["NOM"]
             named = named.decode() if isinstance(named, bytes) else str(named)
             each = [named[i : i + 16].strip() for i in range(0, len(named), 16)]
@@ -148,7 +150,8 @@ def matrix(path: Path) -> dict[str, np.ndarray]:
 
         return cell_kinds.triplets(kind, mmread(path))
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("*")]
-    table = np.array([re.split(r"[,\s]+", line.strip().rstrip(",")) for line in lines], float)
+    numbers = (re.sub("[dD]", "e", line).strip().rstrip(",") for line in lines)
+    table = np.array([re.split(r"[,\s]+", row) for row in numbers], float)
     if table.ndim != 2 or table.shape[1] != 5:
         raise ValueError(f"{path.name} must have rows of node, direction, node, direction and value")
     return {f"{kind}_entries": table}

@@ -1,6 +1,7 @@
 """Results, decks and matrices of Nastran."""
 
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,6 +127,36 @@ def written_deck(path, dofs, sets=True, entries=None):
                 lines.append(f"{start}*       {dofs[row][0]:>16}{dofs[row][1]:>16}{value:>16}")
     path.write_text("\n".join([*lines, ""]))
     return path
+
+
+def test_a_set_of_modes_of_nastran_has_their_own_modal_masses(tmp_path, monkeypatch):
+    """The table of eigenvalues is of all modes; shapes may be written of some."""
+    from pyNastran.op2 import op2
+
+    files = [tmp_path / "bar.op2", written_deck(tmp_path / "bar.bdf", np.zeros((0, 2), int), sets=False)]
+    written_op2(files[0], [16.0, 900.0], np.ones((2, 2, 6), "float32"), np.array([4.0, 30.0]) / (2.0 * np.pi))
+    read = op2.read_op2
+
+    def read_with_masses(*given, **more):
+        found = read(*given, **more)
+        found.eigenvectors[1].modes = np.array([2, 4])
+        masses = SimpleNamespace(mode=np.arange(1, 5), generalized_mass=np.array([1.0, 4.0, 9.0, 25.0]))
+        found.eigenvalues["all"] = masses
+        return found
+
+    monkeypatch.setattr(op2, "read_op2", read_with_masses)
+    assert_allclose(fi.Body.load(files, mass=1.0).shapes[0, 0], [0.5, 0.2])
+
+
+@pytest.mark.parametrize(("card", "said"), [
+    ("GRDSET,,,,,,7\nCORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.", "names coordinate systems in GRDSET"),
+    ("PARAM,CK2,2.", "scales matrices by PARAM CK2"),
+])  # fmt: skip
+def test_cards_that_change_all_others_are_refused(tmp_path, card, said):
+    deck = written_deck(tmp_path / "bar.bdf", np.zeros((0, 2), int), sets=False)
+    deck.write_text(f"SOL 103\nCEND\nbegin  bulk\n{card}\n{deck.read_text()}ENDDATA\n")
+    with pytest.raises(ValueError, match=said):
+        fi.Body.load(deck)
 
 
 def test_matrices_of_nastran_with_the_sets_of_their_deck(tmp_path):

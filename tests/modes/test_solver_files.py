@@ -48,8 +48,11 @@ def test_matrices_of_abaqus_beside_its_mesh(tmp_path):
     deck = ["*HEADING", "*NODE", *mesh, "*ELEMENT, TYPE=B31", *cells, "*NSET, NSET=quarter", "60", ""]
     (tmp_path / "bar.inp").write_text("\n".join(deck))
     labels = [f"{10 * (i + 1)},{way}" for i in range(N + 1) for way in range(1, 7)]
-    for name, matrix in (("bar_STIF1", K), ("bar_MASS1", M)):
-        rows = (f"{labels[i]}, {labels[j]}, {matrix[i, j]:.16e}" for i, j in zip(*np.nonzero(np.tril(matrix))))
+    for name, matrix, letter in (("bar_STIF1", K, "E"), ("bar_MASS1", M, "D")):
+        rows = (
+            f"{labels[i]}, {labels[j]}, {matrix[i, j]:.16E}".replace("E", letter)
+            for i, j in zip(*np.nonzero(np.tril(matrix)))
+        )
         (tmp_path / f"{name}.mtx").write_text("\n".join(["** Assembled", *rows, ""]))
     body = fi.Body.load([tmp_path / name for name in ("bar.inp", "bar_STIF1.mtx", "bar_MASS1.mtx")])
     assert body.at("quarter") == pytest.approx((0.1,)) and body.numbers[5] == 60
@@ -113,6 +116,7 @@ def test_modes_and_static_solutions_of_code_aster(tmp_path, partly):
     values = rng.standard_normal((4, len(points), 3))
     rows = np.flatnonzero(points[:, 2] > 0.0) if partly else None
     fields = {"MODES___DEPL": zip((150.0, 90.0, 400.0), values), "STAT____DEPL": [(0.0, values[3])]}
+    fields |= {"MODES___REAC_NODA": [(150.0, values[1])], "STAT____FORC_NODA": [(0.0, values[2])]}  # no motions
     path = written_med(tmp_path / "block.med", fields, rows)
     body = fi.Body.load(path, mass=3.0, loads=[(len(points), (0.0, 0.0, 1.0))])
     wanted = np.where((points[:, 2:] > 0.0) | (not partly), values, 0.0)
