@@ -149,8 +149,11 @@ def test_a_set_of_modes_of_nastran_has_their_own_modal_masses(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(("card", "said"), [
-    ("GRDSET,,,,,,7\nCORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.", "names coordinate systems in GRDSET"),
-    ("PARAM,CK2,2.", "scales matrices by PARAM CK2"),
+    (
+        "GRDSET,,,,,,7\nCORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.",
+        "names coordinate systems in GRDSET; write them to each GRID",
+    ),
+    ("PARAM,CK2,2.", "scales matrices by PARAM CK2; write them as they are meant, without it"),
 ])  # fmt: skip
 def test_cards_that_change_all_others_are_refused(tmp_path, card, said):
     deck = written_deck(tmp_path / "bar.bdf", np.zeros((0, 2), int), sets=False)
