@@ -249,10 +249,13 @@ def test_the_benchmark_finds_a_machine_that_people_use():
     assert cost.benchmark().credible  # within a factor of twenty of REFERENCE
 
 
+@pytest.mark.skipif(not build.COMPILED, reason="the benchmark is for compiled kernels")
 @pytest.mark.parametrize("name", ["marked_linear", "drumstick"])
 @pytest.mark.slow
 def test_predicted_time_is_of_the_right_size(name):
-    """Within four, and not two as in `cost_predictions.py`: a busy machine doubles even the processor time."""
+    """On this machine, within four, not two as in `cost_predictions.py`: others double even the processor time."""
+    assert cost.calibrate()
+    cost.this_machine.cache_clear()
     scene = fi.load_scene(SHIPPED / f"{name}.toml")
     plan = scene.plan(tolerance=1e-2)
     start = time.process_time()
