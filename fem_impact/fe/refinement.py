@@ -147,11 +147,11 @@ def _pairs(
     flexibility = Flexibility.of(system)
     n_rigid, rate = system.rigid.shape[1], system.frame.rate
     limit = None if max_frequency is None else (2.0 * np.pi * max_frequency / rate) ** 2
+    inert = shallow.mass_in_plane(system) if system.ribbed else None  # without ribs left out, as formulas of shells do
     if n_modes is None:
         assert limit is not None
-        # with the mass in the plane of a ribbed plate, of which a drift spares some, there are no more below
-        heavy = system.M + shallow.mass_in_plane(system).whole if system.ribbed else system.M
-        n_modes = count_below(system.K, heavy, limit)
+        # with the mass in the plane, of which a drift spares some, there are no more below
+        n_modes = count_below(system.K, system.M if inert is None else system.M + inert.whole, limit)
         if n_modes == 0:
             raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
     if n_modes <= n_rigid:
@@ -159,14 +159,15 @@ def _pairs(
     else:
         n = n_modes - n_rigid
         many = system.mesh.dimension == 1 and n > FIRST_SLICE
-        if system.ribbed:  # with the mass in the plane others may be among them
+        if inert is not None:  # with the mass in the plane others may be among them
             n, limit = max(n, min(n + 2 * BLOCK, len(flexibility.inertial) - n_rigid)), None
         values, vectors = by_slices(flexibility, n) if many else _complete_eigenpairs(system, flexibility, n, limit)
         if system.strain is not None:  # more accurate than K if there are tiny triangles
             values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, system.M @ vectors)
             order = np.argsort(values, kind="stable")
             values, vectors = values[order], vectors[:, order]
-        values, vectors = with_mass_in_plane(system, flexibility, values, vectors)
+        if inert is not None and len(values):
+            values, vectors = with_mass_in_plane(system, inert, flexibility, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     if max_frequency is not None:
         omega = omega[omega <= 2.0 * np.pi * max_frequency]
@@ -291,17 +292,15 @@ def _complete_eigenpairs(
 
 @one_thread
 def with_mass_in_plane(
-    system: System, flexibility: Flexibility, values: np.ndarray, vectors: np.ndarray
+    system: System, inert: shallow.PlaneMass, flexibility: Flexibility, values: np.ndarray, vectors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (n,) and vectors (n_dofs, n), with the mass in the plane of a ribbed plate.
 
-    Without ribs it is left out, as formulas of shells do. With it the plane has modes of its own, and the space is that
-    of the vectors and of the lowest of both. The inverse problem keeps the digits of the lowest.
+    With it the plane has modes of its own, and the space is that of the vectors and of the lowest of both. The inverse
+    problem keeps the digits of the lowest.
     """
-    if not system.ribbed or not len(values):
-        return values, vectors
-    weigh, sprung = shallow.mass_in_plane(system), flexibility.sprung
-    whole, n, pulled = weigh._replace(whole=weigh.whole + system.M), len(values), system.M @ sprung
+    whole, n, sprung = inert._replace(whole=inert.whole + system.M), len(values), flexibility.sprung
+    pulled = system.M @ sprung
 
     def unsprung(loads: np.ndarray) -> np.ndarray:
         return flexibility.bent(flexibility.solve(loads - pulled @ (sprung.T @ loads)))[0]

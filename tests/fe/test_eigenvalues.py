@@ -7,9 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import linalg
 from scipy.sparse import csc_matrix
-from threadpoolctl import threadpool_info, threadpool_limits
 
-from fem_impact._base import threads
 from fem_impact._base.check import SimulationError
 from fem_impact.fe import eigenvalues, refinement
 from fem_impact.fe.assembly import assemble
@@ -107,26 +105,3 @@ def test_modes_that_stay_missing_are_found_by_asking_for_more(monkeypatch):
         refinement.solve_on_mesh(system, 12, None)
     many = system.n_dofs // 3
     assert len(refinement.solve_on_mesh(system, many, None).omega) == many
-
-
-def test_factors_are_found_and_used_on_one_thread_and_leave_the_others_to_the_rest(monkeypatch):
-    """Two threads took seven times the processor time for the 1 800 loads of a curved sheet."""
-    taken = []
-
-    class Watched:
-        def __init__(self, *matrix, **options):
-            taken.append(counted())
-
-        def solve(self, loads):
-            taken.append(counted())
-            return loads
-
-    def counted():
-        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
-
-    monkeypatch.setattr(eigenvalues, "splu", Watched)
-    threads._libraries.cache_clear()  # libraries that other tests have loaded since, NGSolve's among them, count, too
-    with threadpool_limits(2, user_api="blas"):
-        usual = counted()
-        eigenvalues.factorise(csc_matrix(np.eye(3))).solve(np.ones((3, 1)))
-        assert taken == [{1}, {1}] and counted() == usual
