@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 from skfem import ElementLineHermite, MeshLine
 
+from .._base.remembered import gauss_rule
 from .._base.rounding import EPSILON, HALVINGS, SAME
 from .._base.untyped import Cells
 from ..mesh.facets import powers
@@ -174,8 +175,8 @@ def support_ends(body: Subject, domain: Domain) -> Held:
 
 def quadrature(space: Any) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points of every element and their weights, both (n_cells, n_q)."""
-    node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
-    return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
+    x, dx = gauss_rule(QUADRATURE)
+    return space.start[:, None] + x * space.length[:, None], dx * space.length[:, None]
 
 
 def divide_lines(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> Cells:

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MeshTri
 from skfem.quadrature import get_quadrature
 
+from .._base.remembered import gauss_rule
 from .._base.rounding import SAME
 from .._base.untyped import Cells
 from ..mesh.facets import CURVE_STEPS, Curves, powers
@@ -303,9 +304,9 @@ def triangles(points: np.ndarray, cells: np.ndarray) -> Cells:
 
 def triangle_gauss_points(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points (n**2, 2) of the reference triangle, so many in each direction, and their weights (n**2,)."""
-    node, weight = np.polynomial.legendre.leggauss(n)
-    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
-    return np.column_stack([a, b * (1.0 - a)]), 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
+    x, dx = gauss_rule(n)
+    a, b = (each.ravel() for each in np.meshgrid(x, x, indexing="ij"))
+    return np.column_stack([a, b * (1.0 - a)]), np.outer(dx, dx).ravel() * (1.0 - a)
 
 
 def on_true_edge(space: Triangles, local: np.ndarray, weight: np.ndarray) -> Points:

@@ -161,11 +161,12 @@ def stretching_forms(
     moved = settled @ mixed
     every = np.triu_indices(n)
     width = len(every[0]) + more
+    before = np.append(np.flatnonzero(every[1] < low), len(every[0]) + np.arange(more))  # those that chose the fields
     work = np.zeros((count, width))
     for pieces in sheet.blocks(width):
-        strain = strained(pieces, i, j) @ mixed + sheet.strains(pieces) @ moved[sheet.dofs[pieces]][:, None]
-        stress = sheet.moduli[pieces] @ strain
-        work += stress.reshape(-1, count).T @ strained(pieces, *every).reshape(-1, width)
+        strain = strained(pieces, *every)
+        settling = strain[..., before] @ mixed + sheet.strains(pieces) @ moved[sheet.dofs[pieces]][:, None]
+        work += (sheet.moduli[pieces] @ settling).reshape(-1, count).T @ strain.reshape(-1, width)
     result = np.zeros((count, n, n))
     result[:, *every] = 0.5 * work[:, : len(every[0])]
     upper = np.triu(result, 1)

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from .._base.remembered import gauss_rule
 from ..mesh.mesh_files import sides_of
 from .elements import EXPONENTS, curvatures, monomials, triangle_gauss_points
 from .springs import at_facets
@@ -119,13 +120,13 @@ class Residual:
         length = np.linalg.norm(stop - start, axis=1)
         along = (stop - start) / length[:, None]
         normal = np.column_stack([along[:, 1], -along[:, 0]])
-        node, weight = np.polynomial.legendre.leggauss(POINTS)
-        x = start[:, None] + 0.5 * (node + 1.0)[:, None] * (stop - start)[:, None]
+        part, weight = gauss_rule(POINTS)
+        x = start[:, None] + part[:, None] * (stop - start)[:, None]
         every = np.broadcast_to(normal[:, None], x.shape)
         jump = [self.moments.edge_forces(self.beside[:, k], x, every) for k in range(2)]  # (n_sides, 2, n_q, 21)
         rigidity = np.mean([self.moments.rigidity(self.beside[:, k], normal) for k in range(2)], axis=0)
         size = length[:, None] / DEGREE * np.column_stack([np.ones(len(length)), (length / DEGREE) ** 2])
-        scale = np.sqrt(0.5 * size[..., None] * length[:, None, None] * 0.5 * weight / rigidity[:, None, None])
+        scale = np.sqrt(0.5 * size[..., None] * length[:, None, None] * weight / rigidity[:, None, None])
         jumps = np.concatenate([jump[0], -jump[1]], axis=3) * scale[..., None]
         self.jumps = jumps.reshape(len(shared), -1, 42)  # (n_sides, 2 n_q, 42) of moment and force
 

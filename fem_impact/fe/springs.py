@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from .._base.remembered import gauss_rule
 from .section import Elastic
 from .supports import cells_of_facets
 
@@ -16,13 +17,13 @@ def at_facets(space: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     Places and outward unit normals are (n, n_q, 2), weights (n, n_q).
     """
     cells = cells_of_facets(facets, space.vertices)[0]
-    node, weight = np.polynomial.legendre.leggauss(8)  # exact for products of quintics
-    s = 0.5 * (node + 1.0)[:, None]
+    x, dx = gauss_rule(8)  # exact for products of quintics
+    s = x[:, None]
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
     x, tangent = space.points_along(cells, area, last - first)
-    normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
+    normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * dx[:, None]
     ds = np.linalg.norm(normal, axis=2)
     return cells, area, x, ds, normal / ds[..., None]
 

@@ -1,8 +1,10 @@
 """Free motion at many equally spaced times: sums of decaying waves as a product of two small tables."""
 
+import math
+
 import numpy as np
 
-BLOCK = 128, 128  # [-] times in a block, and blocks computed at a time: does not change the result
+BLOCK = 128  # [-] times in a block, and blocks computed at a time, at most: does not change the result
 
 
 def roots(omega: np.ndarray, zeta: np.ndarray) -> np.ndarray:
@@ -35,7 +37,7 @@ def flexible_motion(
     waves = both[0].imag != 0.0
     parts = np.concatenate([np.where(waves, 2.0, 1.0) * parts[0], parts[1, ~waves]])
     rates = np.concatenate([both[0], both[1, ~waves]])
-    block, n_blocks = BLOCK
+    block = n_blocks = min(BLOCK, math.isqrt(len(times)) + 1)  # two tables of one size are the smallest
     step = (times[-1] - times[0]) / max(1, len(times) - 1)
     table = np.hstack(_powers(rates, step * np.arange(block))).T  # (2 n_rates, block)
     real, imag = _powers(rates, step * block * np.arange(n_blocks))  # (n_blocks, n_rates)

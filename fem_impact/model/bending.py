@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
+from .._base.remembered import gauss_rule
 from ..fe import beam_elements
 from ..fe.assembly import System, support_of_facets
 from ..fe.corners import edge_meetings
@@ -288,8 +289,7 @@ def _by_formula(
         k = np.pi**2 * ((m / shapes.length) ** 2 + (n / shapes.width) ** 2)
         odd = (1.0 - (-1.0) ** m) * (1.0 - (-1.0) ** n)
         return k, k, 2.0 * shapes.length * shapes.width * odd / (np.pi**2 * m * n), 0.0
-    node, weight = np.polynomial.legendre.leggauss(200)  # 20 and more for each wave of the fortieth mode
-    x, dx = 0.5 * (node + 1.0), 0.5 * weight
+    x, dx = gauss_rule(200)  # 20 and more for each wave of the fortieth mode
     if isinstance(shapes, DiskShapes):
         return _disk(shapes, body, x[:, None], (dx * x)[:, None])
     steep = dx @ shapes.slopes(x) ** 2 / shapes.length**2

@@ -166,7 +166,7 @@ def _curved(struck: Struck, body: Known, integrals: Bending) -> Assumption:
 
     try:
         better = follow_again(history, stretched=Stretched(found.forms, found.linear, mine.start))
-        moved = better.states(_times(struck))[0][:, mine]
+        moved = _swinging(struck, better)[:, mine]
     except SimulationError:
         return SMALL.judged(struck, value, dict.fromkeys(struck.quantities), _remedy(body, value))
     effect = distance.of_blows(replace(struck.before, history=better), struck.before, struck.hit.quantities)
@@ -232,17 +232,23 @@ def _times(struck: Struck) -> np.ndarray:
     return np.append(np.linspace(0.0, end, TIMES + 1)[1:], np.linspace(end, end + 2.0 * period, 2 * TIMES))
 
 
+def _swinging(struck: Struck, history: Any) -> np.ndarray:
+    """States (n_times, n_all) [m kg**0.5] of a blow with stretching at `_times`, the steps between these after it."""
+    times = _times(struck)
+    longest = max(history.stretched.base, (times[-1] - struck.end) / (2.0 * TIMES))
+    slower = replace(history, stretched=replace(history.stretched, base=longest))
+    return np.asarray(slower.states(times)[0])
+
+
 def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     """A blow that has stretching in it: how large it gets, and what stress fields and modes left out would change.
 
     The fields that are not kept change less than the smaller half of those that are. The largest deflection is
     searched in two periods of the first mode after the blow.
     """
-    mine, history, times = struck.mine, struck.hit.history, _times(struck)
+    mine, history = struck.mine, struck.hit.history
     assert history.stretched is not None and body.thickness is not None
-    flexible = history.omega[mine] > 0.0
-    longest = max(history.stretched.base, (times[-1] - struck.end) / (2.0 * TIMES))
-    states = replace(history, stretched=replace(history.stretched, base=longest)).states(times)[0]
+    flexible, states = history.omega[mine] > 0.0, _swinging(struck, history)
     moved = states[:, mine]
     value = float(np.abs(moved @ (flexible * history.shape[0, mine])).max(initial=0.0)) / body.thickness
     own, remedy = Stretching(history.stretched.forms, history.stretched.linear), LOCAL + _of_rise(body, value)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .._base import check
-from .._base.remembered import Remembered
+from .._base.remembered import Remembered, gauss_rule
 from .._base.rounding import SAME
 from ..fe import point_load
 from ..fe.assembly import System
@@ -270,8 +270,8 @@ class SampledShapes(Shapes, check.Locked):
 
 def gauss(length: float, wave: float) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points (n,) [m] from 0 to a length [m] and weights (n,) [m], for waves of up to so many rad/m."""
-    node, weight = np.polynomial.legendre.leggauss(8 + math.ceil(0.3 * wave * length))
-    return 0.5 * length * (node + 1.0), 0.5 * length * weight
+    x, dx = gauss_rule(8 + math.ceil(0.3 * wave * length))
+    return length * x, length * dx
 
 
 def compliance_errors(shapes: Shapes, points: np.ndarray) -> dict[str, np.ndarray]:

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from .._base.remembered import gauss_rule
 from .._base.threads import one_thread
 from ..fe import membrane, slopes
 from ..fe.assembly import System, assemble, support_of_facets
@@ -152,8 +153,8 @@ def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
         area = float(section.inertia(np.zeros((1, 1)))[0]) / section.material.rho
         waves = shapes.k if isinstance(shapes, BeamShapes) else shapes.stoutness.waves(shapes.p)[0]
         # forty, and one more for each radian of the highest mode: six per wave
-        node, weight = np.polynomial.legendre.leggauss(40 + int(waves.max()))
-        slope = shapes.slopes(0.5 * (node + 1.0))
-        gram = (0.5 * weight[:, None] * slope).T @ slope / shapes.length
+        x, dx = gauss_rule(40 + int(waves.max()))
+        slope = shapes.slopes(x)
+        gram = (dx[:, None] * slope).T @ slope / shapes.length
         return gram, shapes.length / (section.material.E * area)
     raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")

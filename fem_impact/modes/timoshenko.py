@@ -23,6 +23,7 @@ from functools import lru_cache
 import numpy as np
 
 from .._base import check
+from .._base.remembered import gauss_rule
 from .._base.rounding import HALVINGS, SAME
 from ..fe.theory import blocks
 from .shapes import ClosedShapes
@@ -117,10 +118,10 @@ class Stoutness:
         found = np.linalg.svd(rows / size)[2][:, 3] / size[:, 0]
         for block in blocks(len(p), TOGETHER):
             k = self.waves(p[block])[0].max()
-            node, weight = np.polynomial.legendre.leggauss(int(k) + 40)
-            w, beta = np.moveaxis(self.fields(p[block], 0.5 * (node + 1.0))[:, :, :2], 2, 0)
+            x, dx = gauss_rule(int(k) + 40)
+            w, beta = np.moveaxis(self.fields(p[block], x)[:, :, :2], 2, 0)
             w, beta = ((part @ found[block][..., None])[..., 0] for part in (w, beta))
-            found[block] /= np.sqrt(0.5 * (w**2 + self.R * beta**2) @ weight)[:, None]
+            found[block] /= np.sqrt((w**2 + self.R * beta**2) @ dx)[:, None]
         near = np.einsum("nij,nj->ni", self.fields(p, np.array([1e-3]))[:, 0], found)[:, 0]
         return found * np.where(near < 0.0, -1.0, 1.0)[:, None]
 
@@ -231,9 +232,9 @@ def green(ends: tuple[str, str], stoutness: Stoutness, load: float) -> Callable[
     far, right = np.ones(1), list(ENDS[ends[1]])
     start = np.zeros(4)
     start[left] = np.linalg.lstsq(constants(far)[right, 0][:, left], -driven(far)[right, 0], rcond=None)[0]
-    node, weight = np.polynomial.legendre.leggauss(6)  # exact on either side of the force
-    place = np.concatenate([0.5 * load * (node + 1.0), load + 0.5 * (1.0 - load) * (node + 1.0)])
-    share = np.concatenate([0.5 * load * weight, 0.5 * (1.0 - load) * weight])
+    x, dx = gauss_rule(6)  # exact on either side of the force
+    place = np.concatenate([load * x, load + (1.0 - load) * x])
+    share = np.concatenate([load * dx, (1.0 - load) * dx])
     w, beta = (constants(place) @ start + driven(place))[:2]
     carried = moving @ np.vstack([share @ w, share @ (place * w) + R * share @ beta])  # (n_rigid, 1)
     drift = carried.ravel() @ moving

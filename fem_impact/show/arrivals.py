@@ -36,7 +36,7 @@ def velocity(response: Response, audible: np.ndarray, shape: np.ndarray, times: 
     # the first sample of every long free flight and of what follows it; the last begins when the blow is over
     first = np.searchsorted(times, np.append(0.0, ends[busy]))
     after = np.append(np.searchsorted(times, history.steps[busy, layout.START]), len(times))
-    long = after - first >= free_motion.BLOCK[0]
+    long = after - first >= free_motion.BLOCK
     long[-1] = after[-1] > first[-1]
     flights = list(zip(first[long].tolist(), after[long].tolist()))
     alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights

@@ -3,7 +3,19 @@
 import pickle
 from functools import partial
 
-from fem_impact._base.remembered import Remembered
+import numpy as np
+import pytest
+
+from fem_impact._base.remembered import Remembered, gauss_rule
+
+
+def test_a_gauss_rule_is_exact_for_polynomials_and_found_once():
+    x, dx = gauss_rule(5)
+    for power in range(10):
+        assert dx @ x**power == pytest.approx(1.0 / (power + 1.0), rel=1e-14)  # rounding of five numbers
+    assert gauss_rule(5)[0] is x
+    with pytest.raises(ValueError, match="read-only"):
+        np.copyto(x, 0.0)
 
 
 def test_known_results_are_not_computed_again_and_the_oldest_are_dropped():

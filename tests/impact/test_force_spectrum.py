@@ -75,6 +75,18 @@ def test_the_transform_is_exact_to_rounding(highest, monkeypatch):
         assert_allclose(found, exact, rtol=0.0, atol=allowed(pieces, highest, 2e-14) * whole)
 
 
+def test_few_impulses_and_many_are_summed_alike():
+    """One more without impulse makes them so many that cells collect them."""
+    rng = np.random.default_rng(5)
+    time, impulse = np.sort(rng.uniform(0.0, 3e-3, 300)), rng.normal(size=300) * (np.arange(300) > 0)
+    for count in (1, 2, 97, 4096):
+        many = force_spectrum.transform_impulses(time, impulse, 20.0, count)
+        few = force_spectrum.transform_impulses(time[1:], impulse[1:], 20.0, count)
+        phase = 2.0 * np.pi * 20.0 * count * time[-1]
+        limit = (1e-15 + np.finfo(float).eps * phase) * np.abs(impulse).sum()  # rounding, and that of the phase
+        assert_allclose(few, many, rtol=0.0, atol=limit)
+
+
 @pytest.mark.parametrize("highest", [0.0, 1e-3, 1e3, 1e5, 1e7, 1e9, 1e12])  # Hz: over a piece from 0 to 6e7 rad
 def test_the_direct_sum_is_exact_to_rounding(highest):
     pieces, whole = rough(300, seed=2)

@@ -53,7 +53,7 @@ def test_flights_between_touches_sound_like_a_direct_sum():
     hit = fi.collide([fi.Modes.rigid(0.02), modes], [touch], duration=0.1, tolerance=1e-3, **pull)
     heard = sound.synthesise(hit, POINTS[1], duration=0.2)
     gaps = [after.start - before.end for before, after in zip(hit.impacts, hit.impacts[1:])]
-    assert max(gaps) * sound.RATE > 2 * free_motion.BLOCK[0]
+    assert max(gaps) * sound.RATE > 2 * free_motion.BLOCK
     direct = hit.modal_state(hit.time[0] + np.arange(9_600) / sound.RATE)[1][:, :3] @ SHAPES[1, 1:4]
     # of the loudest: 1e-12 covers the rounding of phases of up to 2 000 rad
     assert_allclose(heard.samples * sound.FULL_SCALE, direct, rtol=0.0, atol=1e-12 * np.abs(direct).max())
