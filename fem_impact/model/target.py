@@ -251,9 +251,21 @@ class Target:
         return self.scale.get("mass", own + sum(mass for _, mass in self.point_masses))
 
     def count_below(self, frequency: float) -> float:
-        """About how many modes the plate has below a frequency [Hz], before scaling; Weyl's law without its edges."""
+        """About how many modes the plate has below a frequency [Hz], before scaling; Weyl's law without its edges.
+
+        Waves of a thick plate are shorter, and above a frequency those of shear and twist over its thickness come, too.
+        """
         assert self.mesh is not None
-        return self.wave(frequency) ** 2 * self.mesh.area / (4.0 * np.pi)
+        square, section = self.wave(frequency) ** 2, self.section
+        if self.thick and isinstance(section, Plate):
+            middle, pull = self.mesh.points[self.mesh.cells].mean(axis=1), (2.0 * np.pi * frequency) ** 2
+            bending, _, inertia = self._sections
+            shear, turning = np.linalg.eigvalsh(section.shear(middle))[:, 0], pull * section.rotary(middle)
+            mean, root = 0.5 * (pull * inertia / shear + turning / bending), pull * inertia / bending
+            root = np.sqrt(root + 0.25 * (pull * inertia / shear - turning / bending) ** 2)
+            twisted = (turning - shear) / section.stiffness(middle)[:, 2, 2]
+            square = (mean + root + np.maximum(mean - root, 0.0) + np.maximum(twisted, 0.0)).max()
+        return float(square * self.mesh.area / (4.0 * np.pi))
 
     def frequency_below(self, count: float) -> float:
         """Frequency [Hz], before scaling, below which the plate has about so many modes; see `count_below`."""

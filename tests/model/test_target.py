@@ -195,6 +195,27 @@ def test_modes_of_strips_are_counted_by_their_area(length, edge):
     assert target.number_below(first, 0.0) == 0.0  # of a force that reaches no frequency
 
 
+@pytest.mark.parametrize(("h", "frequency"), [(0.05, 2.0), (0.05, 20.0), (0.2, 10.0)])
+def test_modes_of_thick_plates_are_counted_with_those_of_their_thickness(h, frequency):
+    """A hinged square, E = rho = 1, by three unknowns for each pair of half waves."""
+    D, S, turn = h**3 / 12.0 / 0.91, h / 2.6 * 5.0 / 6.0, h**3 / 12.0
+    a, b = np.meshgrid(*2 * [np.pi * np.arange(400)], indexing="ij")
+    K = np.zeros((*a.shape, 3, 3))
+    K[..., 0, 0], K[..., 0, 1], K[..., 0, 2] = (
+        S * (a**2 + b**2) / h,
+        -S * a / (h * turn) ** 0.5,
+        -S * b / (h * turn) ** 0.5,
+    )
+    K[..., 1, 1] = (D * (a**2 + 0.35 * b**2) + S) / turn
+    K[..., 2, 2] = (D * (b**2 + 0.35 * a**2) + S) / turn
+    K[..., 1, 2] = 0.65 * D * a * b / turn
+    square = np.linalg.eigvalsh(K, UPLO="U")
+    exact = (square[1:, 1:] < (2.0 * np.pi * frequency) ** 2).sum()
+    plate = fi.Plate(fi.Material(E=1.0, nu=0.3, rho=1.0), h)
+    found = Target.of(fi.assemble(fi.mesh.rectangle(1.0, 1.0), plate, {"boundary": "hinged"}, theory="mindlin"))
+    assert_allclose(found.count_below(frequency), exact, rtol=0.25)  # the edges take up to a fifth of few modes
+
+
 @pytest.mark.parametrize("theory", ["kirchhoff", "mindlin"])
 def test_a_strip_with_too_many_modes_is_refused_before_the_first_are_found(theory, monkeypatch):
     monkeypatch.setattr(refinement, "solve_on_mesh", None)  # takes minutes
