@@ -77,14 +77,20 @@ def differing_axes(points: np.ndarray, without: str = "") -> list[int]:
     return [i for i, wide in zip(others, spread) if wide > SAME * max(spread.max(), 1e-300)] or others[:1]
 
 
-def count_rigid(size: np.ndarray, far: float = 0.01) -> int:
-    """How many modes of frequencies [Hz] ascending in size are rigid: rounding leaves at most six far below."""
-    return max((k for k in range(1, min(7, len(size))) if size[k - 1] < far * size[k]), default=0)
+def count_rigid(frequencies: np.ndarray) -> int:
+    """How many modes are rigid, at most six, of frequencies ascending in size and below zero where eigenvalues are.
+
+    No spring has a negative eigenvalue: rounding is then as large. Without any, springs are as soft only where
+    eigenvalues differ as the digits of files do: a mount is none.
+    """
+    size, rounding = np.abs(frequencies), max(0.0, -10.0 * float(frequencies.min(initial=0.0)))
+    far = [0.01 if one <= rounding else 3e-4 for one in size]
+    return max((k for k in range(1, min(7, len(size))) if size[k - 1] < far[k - 1] * size[k]), default=0)
 
 
 def settle_frequencies(frequencies: np.ndarray) -> np.ndarray:
     """Frequencies [Hz], ascending in size and below zero where eigenvalues are, with zeros for rigid motions."""
-    n_rigid = count_rigid(np.abs(frequencies))
+    n_rigid = count_rigid(frequencies)
     found = np.append(np.zeros(n_rigid), frequencies[n_rigid:])
     if (found < 0.0).any():
         raise ValueError(

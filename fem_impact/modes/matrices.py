@@ -252,16 +252,12 @@ def _resisted(forces: np.ndarray, motions: np.ndarray, size: np.ndarray, rounded
 
 
 def _release_rigid(M: Any, K: Any, slowest: np.ndarray, rigid: np.ndarray) -> tuple[Any, np.ndarray]:
-    """Stiffness without the rounding that resists rigid motions, and these (n, n_rigid), if it hid some of them.
-
-    No spring has a negative eigenvalue: the rounding is then as large. Without any, springs are as soft only where
-    eigenvalues differ as the digits of files do.
-    """
+    """Stiffness without the rounding that resists rigid motions, and these (n, n_rigid), if it hid some of them."""
     inert = np.einsum("ij,ij->j", slowest, M @ slowest)
     slowest = slowest[:, inert > 0.0] / np.sqrt(inert[inert > 0.0])  # mass-normalised, as they are orthogonal
     values, way = eigh(slowest.T @ (K @ slowest))
     order = np.argsort(np.abs(values))
-    n_rigid = cell_kinds.count_rigid(np.abs(values[order]) ** 0.5, 0.01 if values[0] < 0.0 else KEPT**0.5)
+    n_rigid = cell_kinds.count_rigid((np.sign(values) * np.abs(values) ** 0.5)[order])
     if n_rigid <= rigid.shape[1]:
         return K, rigid
     rigid = slowest @ way[:, order[:n_rigid]]

@@ -538,7 +538,7 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
         doubt = doubt + np.diag(
             carried_compliance(modes.omega, rows, rows, 10.0 * modes.frequency_error[modes.omega > 0.0])
         )
-    allowed = doubt.copy()
+    allowed = doubt + SAME * np.abs(np.diag(whole))
     dent = modes.shapes.dent(place)[:, 0]
     if dent.any():  # short waves dent a solid, too: modes may hold more of the dent than was left of the compliance
         beyond = np.minimum(np.maximum(-np.diag(rest), 0.0), np.maximum(dent, 0.0))
@@ -550,7 +550,7 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
         raise check.SimulationError(
             f"the modes are softer at ({where}) m than the whole body, {whole[i, i]:.4g} m/N, by "
             f"{-rest[i, i]:.2g} m/N, which is more than their errors allow; find the modes on a finer mesh, "
-            "or give the compliance of the whole body"
+            "give the compliance of the whole body, or 0 Hz for rigid motions, where it has none of them"
         )
     return rest, doubt
 

@@ -109,8 +109,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     nodes = place[cell_kinds.rows_of(numbers, measured)]
     table = [_mode(path.name, i, mode, measured) for i, mode in enumerate(modes)]
     frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: abs(entry[0]))) if table else ((), (), ())
-    found = np.array(frequencies)
-    found = cell_kinds.settle_frequencies(found) if (found < 0.0).any() else found
+    found = cell_kinds.settle_frequencies(np.array(frequencies))
     result = {"frequencies": found, "damping_ratio": np.array(damping), "nodes": nodes}
     still = [_moved(path.name, i, one, measured) / length for i, one in enumerate(static)]
     result |= cell_kinds.steps(len(nodes), shapes, still)

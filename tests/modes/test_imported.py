@@ -140,6 +140,18 @@ def test_a_negative_eigenvalue_is_a_rigid_motion_only_if_it_is_tiny():
             fi.Body.load(told | {"frequencies": wrong})
 
 
+def test_a_mount_is_no_rigid_motion():
+    """At 1 % of the next mode rounding shows in what is negative; a mount of 5 Hz was taken as rigid in silence."""
+    told = {"shapes": np.random.default_rng(0).normal(size=(4, 3, 3)), "nodes": np.eye(4, 3), "mass": 1.0}
+    for given, n_rigid in (
+        ([5.0, 6.0, 800.0], 0),
+        ([0.01, 0.02, 110.0], 2),
+        ([-0.3, 0.8, 110.0], 2),
+        ([-1e-3, 5.0, 800.0], 1),
+    ):
+        assert np.count_nonzero(fi.Body.load(told | {"frequencies": given}).frequencies == 0.0) == n_rigid
+
+
 def test_a_mode_told_twice_is_refused():
     """Two modes of one frequency differ at some of four nodes, and at fewer they may not."""
     shapes = np.random.default_rng(1).normal(size=(4, 3, 2))[..., [0, 1, 1]]

@@ -67,3 +67,17 @@ def test_a_point_measured_twice_alike_is_known():
 def test_frequencies_whose_squares_are_no_numbers_are_refused():
     with pytest.raises(ValueError, match="frequencies above zero must be at least 1e-75 Hz, got 1e-300 Hz"):
         fi.Modes.from_arrays([1e-300, 10.0], np.eye(2), points=[[0.0], [1.0]], mass=1.0)
+
+
+def test_stiffness_of_rounding_beside_the_compliance_of_a_free_body_is_told():
+    """The compliance of a body of which all modes are known is theirs to the rounding of an inverse."""
+    shapes, points = np.array([[1.0, 1.2], [1.0, -1.2]]), [[0.0], [0.1]]
+    for omega, change, said in (([30.0, 3e3], 1.0 - 1e-10, None), ([6.0, 3e3], 0.0, "or 0 Hz for rigid motions")):
+        whole = change * np.outer(shapes[:, 0], shapes[:, 0]) / omega[0] ** 2
+        whole += np.outer(shapes[:, 1], shapes[:, 1]) / omega[1] ** 2
+        body = fi.Modes.from_arrays(np.array(omega) / (2.0 * np.pi), shapes, points=points, mass=1.0, compliance=whole)
+        if said is None:
+            assert np.abs(body.residual_compliance(points)).max() < 1e-9 * whole.max()
+        else:
+            with pytest.raises(fi.SimulationError, match=said):
+                body.residual_compliance(points)

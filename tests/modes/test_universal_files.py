@@ -71,6 +71,16 @@ def test_modes_come_back_as_they_were_written_with_their_elements(written, tmp_p
         fi.in_air(again)
 
 
+def test_rounding_of_rigid_motions_is_none_and_a_mount_no_rigid_motion(plate, read, tmp_path):
+    """Both doors say the same."""
+    sets = plate[1]
+    first = next(each["freq"] for each in sets if each.get("freq"))
+    for frequency, n_rigid in ((1e-5 * first, 3), (5e-3 * first, 0)):
+        for each in [each for each in sets if each["type"] == 55][:3]:
+            each["freq"] = frequency
+        assert read(sets).n_rigid == fi.Body.load(tmp_path / "other.uff", mass=1.0).modes("z").n_rigid == n_rigid
+
+
 def test_nodes_and_triangles_are_in_the_file(written, plate):
     points, sets, _ = plate
     assert [s["type"] for s in sets[:4]] == [15, 2411, 2412, 55]
