@@ -94,7 +94,8 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     channel is taken off; a smaller turn of its phases, as sensors that block what is slow leave, is in the errors.
     """
     s, values, weight, _ = responses(name, found)
-    omega = s.imag
+    omega, decay, turn = s.imag, s.real[0] if len(s) else 0.0, s / np.maximum(np.abs(s), 1e-300) / 1j
+    values = values * (np.square(omega / np.abs(s)))[:, None]  # with poles moved by the decay of a window: turned s**2
     size = np.sqrt(np.square(np.abs(values)).mean(axis=1)) / np.maximum(omega, 1e-300)
     if about is None:
         summits = peaks(size)
@@ -107,6 +108,7 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     widths = np.minimum([_damping(omega, size, i) for i in summits], 0.5 * np.minimum(apart[1:], apart[:-1]))
     start = np.log(np.stack([omega[summits], widths])).reshape(2, -1)
     data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
+    weight = weight * turn**2
     late, (found_modes, begun) = _in_time(omega, data, weight, start, about is not None)
     poles, basis, constants, rest = found_modes
     n, inside = poles.shape[1], _inside(omega, poles)
@@ -122,7 +124,8 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     moved = _moved_by_phases(omega, weight, found_modes)
     doubt, spread = np.hypot(doubt, moved[0]), np.hypot(spread[:n], moved[1])
     doubt *= np.stack([natural / (2.0 * np.pi), damping])
-    damping = np.maximum(damping - float(found.attrs.get("added_damping", 0.0)) / natural, 0.0)  # that of a window
+    inner = natural**2 + decay * (decay - 2.0 * damping * natural)  # of poles that a window has moved
+    damping, natural = np.maximum(damping * natural - decay, 0.0) / np.sqrt(inner), np.sqrt(inner)
     left = float(np.linalg.norm(rest) / max(float(np.linalg.norm(data)), 1e-300))
     misfit = _misfit(omega, np.exp(poles), basis[:, :n], constants[:n], rest)
     whole = natural / (2.0 * np.pi), damping, constants[:n].T, spread.T, misfit, *doubt
@@ -327,12 +330,10 @@ def _with_one_more(
     place = int(np.where(apart, size, 0.0).argmax())
     width = np.median(before.poles[1]) if n else np.log(_damping(omega, size, place))
     start = np.column_stack([before.poles, [np.log(omega[place] if at is None else at), width]])
-    after = _fit(omega, data, weight, start[:, np.argsort(start[0])], 5)
+    after = _fit(omega, data, weight, start[:, np.argsort(start[0])])
     if after.poles.shape[1] != n + 1:
         return None
     natural, damping = np.exp(after.poles)
-    if at is not None and _inside(omega, after.poles).sum() > _inside(omega, before.poles).sum():
-        return None  # it went into the band, where peaks are
     near = np.diff(natural) < (damping * natural)[1:]
     gain = np.square(before.rest).sum() - np.square(after.rest).sum()
     return None if near.any() or gain < _luck(data, after, place) else after
@@ -422,7 +423,7 @@ def _basis(omega: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np
     """Weighted columns of modes, of those below and of those above, real over imaginary parts, (2 n, n_modes + 2); and
     slopes (2, 2 n, n_modes) of the first by logarithms of frequencies and damping ratios, ``poles`` (2, n_modes)."""
     modes, slopes = unit_responses(1j * omega, weight, poles)
-    columns = np.hstack([modes, np.column_stack([weight, -weight * (omega / omega[-1]) ** 2])])
+    columns = np.hstack([modes, np.column_stack([np.abs(weight), -weight * (omega / omega[-1]) ** 2])])
     return np.vstack([columns.real, columns.imag]), np.concatenate([slopes.real, slopes.imag], axis=1)
 
 
