@@ -490,7 +490,7 @@ def universal(path: Path) -> Recording:
         stated = str(one.get("ordinate_axis_units_lab") or "").strip()
         stated = "" if stated == "NONE" else stated
         key = (uff_name(one), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)), code)
-        known, kind, doubts = units.uff_unit(path, key[0], stated, code)
+        known, kind, doubts = units.uff_unit(path, key[0], stated, code, factors)
         notes += doubts
         if kind and not known and kind in factors:
             data = data / factors[kind]

@@ -422,7 +422,7 @@ def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, fl
         ends = [over, ends[1] if known_unit(ends[1]) else under]
     for what, label, default in zip(("ordinate", "orddenom"), ends, ("", "N")):
         code = int(one.get(f"{what}_spec_data_type") or 0)
-        stated, kind, doubts = uff_unit(path, name, label, code)
+        stated, kind, doubts = uff_unit(path, name, label, code, factors)
         notes += doubts
         if stated is None and kind is None and not code and default:
             notes.append(f"{name}: what it is divided by is not stated, N assumed")

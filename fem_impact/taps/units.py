@@ -58,12 +58,20 @@ def label(text: str) -> tuple[str, str]:
     return text.strip(), last[1] if last else ""
 
 
-def uff_unit(path: Path, name: str, label: str, code: int) -> tuple[tuple[str, float] | None, str | None, list[str]]:
-    """What the label of a unit in data set 58 is known as, the unit of its code, and a note if the code decides."""
+def uff_unit(
+    path: Path, name: str, label: str, code: int, factors: Mapping[str, float]
+) -> tuple[tuple[str, float] | None, str | None, list[str]]:
+    """What the label of a unit in data set 58 is known as, the unit of its code, and notes: on what was chosen.
+
+    The code decides where the label is not known, and the label against ``factors``, those of data set 164.
+    """
     known, kind = si_unit(label), UFF_UNITS.get(code)
     if known and kind and known[0] != kind:
         raise ValueError(
             f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"
         )
     doubtful = kind and not known and label not in ("", "NONE")
-    return known, kind, [f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}"] * bool(doubtful)
+    notes = [f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}"] * bool(doubtful)
+    if known and abs(known[1] * factors.get(known[0], 1.0 / known[1]) - 1.0) > 1e-3:
+        notes.append(f"{name}: taken in {label}, as it is labelled, not in the unit of data set 164")
+    return known, kind, notes

@@ -111,6 +111,20 @@ def test_without_a_code_of_the_denominator_force_is_assumed_and_told(written):
     assert found["notes"].tolist() == ["point 1: what it is divided by is not stated, N assumed"]
 
 
+def test_labels_against_the_system_of_units_are_told(written):
+    """They decide, as most programs write them right."""
+    labels = {"ordinate_axis_units_lab": "m/s^2", "orddenom_axis_units_lab": "N"}
+    found = transfer.arrays(written(response(1, **labels), FEET))
+    assert np.allclose(found["H"][:, 0], H, rtol=1e-6)
+    wanted = [
+        f"point 1: taken in {unit}, as it is labelled, not in the unit of data set 164" for unit in ("m/s^2", "N")
+    ]
+    assert found["notes"].tolist() == wanted
+    agreed = labels | {"ordinate_axis_units_lab": "mm/s^2", "orddenom_axis_units_lab": "mN"}
+    system = FEET | {"length": 1e3, "force": 1e3}
+    assert not transfer.arrays(written(response(1, **agreed), system))["notes"].size
+
+
 WRONG = [
     ([response(1, np.abs(H), ord_data_type=4)], "magnitudes only of 'point 1'; export complex responses"),
     ([response(1, abscissa_spec_data_type=17)], "over something else than frequency"),
