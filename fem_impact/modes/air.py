@@ -209,9 +209,9 @@ class _Air:
         self.padded = next_fast_len(2 * nx - 1, True), next_fast_len(2 * ny - 1, True)
         self.distance, self.inverse = between_cells(self.padded, size)
 
-    def _added(self, strength: np.ndarray, spectrum: np.ndarray, omega: float) -> np.ndarray:
-        """Mass [-] that air adds between sources (n, nx, ny) with a known spectrum, at a frequency [rad/s]."""
-        matrix = self._product(strength, spectrum, self._pressing(omega))
+    def _added(self, spectrum: np.ndarray, omega: float) -> np.ndarray:
+        """Mass [-] (n, n) that air adds between sources of a spectrum (n, ...), at a frequency [rad/s]."""
+        matrix = self._product(spectrum, self._pressing(omega))
         return 0.5 * self.weight * (matrix + matrix.T)
 
     def _pressing(self, omega: float) -> np.ndarray:
@@ -224,17 +224,18 @@ class _Air:
         wave = omega / self.speed
         strength = np.tensordot(shapes.T, self.strength, 1)
         kernel = wave * np.sinc(wave / np.pi * self.distance)
-        return 0.5 * self.weight * self._product(strength, rfft2(strength, self.padded), kernel)
+        return 0.5 * self.weight * self._product(rfft2(strength, self.padded), kernel)
 
     def damping(self, shapes: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Damping ratios (n,) by sound of mixtures (n_flexible, n) of the modes at frequencies (n,) [rad/s]."""
         return np.array([max(0.0, self.exchanged(shape[:, None], x)[0, 0]) for shape, x in zip(shapes.T, omega)])
 
-    def _product(self, strength: np.ndarray, spectrum: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-        """Double integrals (n, n) of all pairs of sources (n, nx, ny) with a kernel (padded)."""
-        n, nx, ny = strength.shape
-        pressure = irfft2(spectrum * rfft2(kernel), self.padded)[:, :nx, :ny]
-        return strength.reshape(n, -1) @ pressure.reshape(n, -1).T
+    def _product(self, spectrum: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+        """Double integrals (n, n) of pairs of sources of a spectrum (n, ...) with a kernel (padded), which is even."""
+        weight = rfft2(kernel).real / kernel.size
+        weight[:, 1 : (kernel.shape[1] + 1) // 2] *= 2.0  # for the other half of the spectrum
+        flat = spectrum.reshape(len(spectrum), -1)
+        return np.asarray((flat * weight.ravel()).view(float) @ flat.view(float).T)
 
     def solved(self) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies [rad/s] of the flexible modes, and their mixture of the old ones (n_flexible, n_flexible) [-]."""
@@ -275,7 +276,7 @@ class _Air:
         count = max(2, int(needed[-1]) + 1)  # one alone has no span
         nodes = middle + half * np.cos(np.pi * (np.arange(count) + 0.5) / count)
         spectrum = rfft2(self.strength[window], self.padded)
-        added = BarycentricInterpolator(nodes, [self._added(self.strength[window], spectrum, node) for node in nodes])
+        added = BarycentricInterpolator(nodes, [self._added(spectrum, node) for node in nodes])
         stiffness, unit = np.diag(self.old[window] ** 2), np.eye(window.stop - window.start)
         for i in range(block.start, block.stop):
             only = [i - window.start] * 2
