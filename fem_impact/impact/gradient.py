@@ -268,7 +268,7 @@ def read_quantities(
 def _forces_in_steps(history: History, c: int, count: int) -> np.ndarray:
     """Force [N] of contact c at so many equal fractions of every step, in order of time; zero where it is open."""
     rows = np.arange(len(history.steps)).repeat(count)
-    force = history.force_of(rows, c, np.resize(np.arange(count) / count, len(rows)))[0]
+    force = history.force_of(rows, c, np.tile(np.arange(count) / count, len(history.steps)))[0]
     return np.where(history.pressed[rows, c], force, 0.0)
 
 
@@ -306,9 +306,9 @@ def _impulses(history: History) -> tuple[np.ndarray, np.ndarray]:
     times, impulses = [], []
     for c, pressed in enumerate(history.pressed.T):
         rows = np.flatnonzero(pressed).repeat(len(NODES))
-        part, length = np.resize(0.5 + 0.5 * NODES, len(rows)), history.steps[rows, layout.LENGTH]
+        part, length = np.tile(0.5 + 0.5 * NODES, pressed.sum()), history.steps[rows, layout.LENGTH]
         times.append(history.steps[rows, layout.START] + part * length)
-        impulses.append(np.resize(0.5 * WEIGHTS, len(rows)) * length * history.force_of(rows, c, part)[0])
+        impulses.append(np.tile(0.5 * WEIGHTS, pressed.sum()) * length * history.force_of(rows, c, part)[0])
     time, impulse = np.concatenate(times), np.concatenate(impulses)
     order = np.argsort(time, kind="stable")
     return time[order], impulse[order]
