@@ -63,9 +63,17 @@ class Stretching(check.Locked):
         return Stretching(np.ascontiguousarray(forms), np.ascontiguousarray(linear))
 
 
-@one_thread
 def stretch(modes: Modes) -> Stretching:
-    """How the modes of a plate, or of a beam between held ends, stretch it; raise ValueError for other bodies."""
+    """How the modes of a plate, or of a beam between held ends, stretch it; raise ValueError for other bodies.
+
+    They remember it, as it takes longer than a blow.
+    """
+    found: Stretching = modes.known.recall("stretching", lambda: _stretched(modes))
+    return found
+
+
+@one_thread
+def _stretched(modes: Modes) -> Stretching:
     section, rigid = modes.section, modes.n_rigid
     if section is None or not modes.dimension:
         why = "its section is not known" if modes.dimension else "a mass has none"

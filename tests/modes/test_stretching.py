@@ -27,6 +27,11 @@ def dent(modes, at):
     return energy(modes, softness(modes, at))
 
 
+def test_modes_remember_how_they_stretch():
+    modes = fi.analytic.rectangle(0.3, 0.2, section=PLATE, n_modes=4)
+    assert stretch(modes) is stretch(modes) is not stretch(modes.truncated(n_modes=3))
+
+
 def test_energy_of_a_hinged_square_is_that_of_chu_and_herrmann():
     # 1.316 / 1.5 of Berger's E h / (8 A (1 - nu**2)) (int |grad w|**2)**2, and 0.5 % more as no edge slides
     side, a = 0.2, 0.7e-3
