@@ -362,6 +362,7 @@ class _Engine:
         comparison. ``length`` is the expected number of steps of each blow.
         """
         out, slacks, sure = np.full((N_FOUND, self.blows.n_cases), np.nan), np.zeros(self.blows.n_cases), False
+        out[FOUND_STATUS] = many_blows.LONG
         if slack is not None:
             slacks[cells], sure = slack, True
         pairs = bundles.Pairs(self.shares, self.law, self.rigid, self.static, slacks)
@@ -371,6 +372,8 @@ class _Engine:
         parts = np.split(order, edges)  # of one family and step each
         for limit in LENGTHS:
             now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
+            if limit == LENGTHS[-1]:  # the work is that of its square: the modal engine takes fewer steps with loss
+                now = now & (self.law["loss"][cells] == 0.0)
             track = many_blows.made_track(limit, self.n_modes)
             for part in (each[now[each]] for each in parts):
                 if not part.size:

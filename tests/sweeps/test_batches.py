@@ -258,7 +258,8 @@ def test_a_blow_too_long_for_every_kernel_is_left_at_once(monkeypatch):
     monkeypatch.setattr(many_blows, "run", counted)
     assert not batches.follow_blows(blows, tolerance=1e-3).done.any()
     assert np.isnan(batches.count_impacts(blows, tolerance=1e-3, most=3)).all()
-    assert len(tried) == 2 * len(batches.LENGTHS)  # the first step of each, with kernels ever longer
+    # the first step of each, with kernels ever longer; the longest take more time than the modal engine with loss
+    assert len(tried) == 2 * (len(batches.LENGTHS) - 1)
 
 
 def test_only_stiffness_times_speed_to_the_power_matters():
