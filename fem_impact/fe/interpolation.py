@@ -3,12 +3,15 @@
 from typing import Any
 
 import numpy as np
+import shapely
 from scipy.sparse import csr_matrix, vstack
-from scipy.special import roots_jacobi, roots_legendre
+from scipy.special import roots_jacobi
 
 from .._base import explained
-from .._base.rounding import HALVINGS, ROUNDING
+from .._base.remembered import gauss_rule
+from .._base.rounding import ROUNDING
 from .._base.untyped import Sparse
+from ..mesh.mesh_files import sides_of
 from .section import size_at
 from .theory import Frame, Theory, blocks
 
@@ -60,79 +63,68 @@ def spread_forces(space: Any, points: np.ndarray, radius: np.ndarray) -> tuple[n
     Each disk, of its ``radius`` (n_points,), is cut at the edge of the body. A weight linear in the place moves its
     centre back to the point, so that a rigid motion is followed exactly.
     """
-    # rings and arcs of two points each: these err by 3e-5 of a compliance at h/L = 0.2; at many points, as for a
-    # picture, fewer do, which err by 1e-6 of a mode of h k = 1
-    rings, arcs = (6, 24) if len(points) <= 64 else (3, 4)
-    whole = _whole_disks(space, points, radius)
-    inner, beyond = roots_jacobi(rings, 0.0, 1.0), roots_legendre(2 * rings)  # by the radius; cut arcs begin like roots
-    node = 0.5 * (beyond[0] + 1.0)
-    away = np.hstack([np.outer(whole, 0.5 * (inner[0] + 1.0)), whole[:, None] + np.outer(radius - whole, node**2)])
-    rest = np.outer(radius - whole, 4.0 * node * beyond[1]) * away[:, rings:]
-    weight = np.hstack([np.outer(whole**2, inner[1]), rest])
-    first, last = _arcs_inside(space, points, np.where(weight > 0.0, away, 0.0), arcs)
-    half = np.array([-1.0, 1.0]) / np.sqrt(3.0)
-    turn = 0.5 * (first + last)[..., None] + 0.5 * (last - first)[..., None] * half  # (n_points, rings, arcs, 2)
-    offset = away[:, :, None, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    share = np.broadcast_to((weight[..., None] * (last - first))[..., None], turn.shape).reshape(len(points), -1).copy()
-    offset = offset.reshape(*share.shape, 2)  # (n_points, n_disk, 2)
-    places = points[:, None] + offset
-    share[share > 0.0] *= space.locate(places[share > 0.0])[1]
-    bare = share.sum(axis=1) == 0.0  # all off the body, as around a spike: the point itself
-    places[bare], offset[bare], share[bare] = points[bare, None], 0.0, 1.0
-    share = share / share.sum(axis=1, keepdims=True)
-    centre = np.einsum("pk,pki->pi", share, offset)
-    about = offset - centre[:, None]
-    spread_out = np.einsum("pk,pki,pkj->pij", share, about, about)
+    # rings of a whole disk and places on each, which are the corners of the polygon that stands for a cut one, Gauss
+    # points on its chords, and how far its edges may be off over the radius: so many err by 3e-5 of a compliance at
+    # h/L = 0.2; at many points, as for a picture, fewer do, which err by 1e-6 of a mode of h k = 1
+    rings, around, across, off = (6, 48, 24, 3e-4) if len(points) <= 64 else (3, 16, 8, 2e-3)
+    turn = 2.0 * np.pi * np.arange(around) / around
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    polygons = (radius * np.sqrt(turn[1] / np.sin(turn[1])))[:, None, None] * circle  # of the disk's area
+    body, disks = _outlined(space, off * float(radius.min())), shapely.polygons(points[:, None] + polygons)
+    shapely.prepare(body)
+    whole = shapely.contains(body, disks)
+    inner, cut = np.flatnonzero(whole), np.flatnonzero(~whole)
+    away, weight = roots_jacobi(rings, 0.0, 1.0)  # by the radius
+    on_rings = ((0.5 * (away + 1.0))[:, None, None] * circle).reshape(-1, 2)
+    low, high, width, owner = _chords(shapely.intersection(body, disks[cut]), disks[cut])
+    bare = np.setdiff1d(cut, cut[owner])  # off the body, by less than its curves are known: the point itself
+    along, part = gauss_rule(across)
+    found = (  # points, places of each and their shares
+        (inner, points[inner, None] + radius[inner, None, None] * on_rings, np.repeat(weight, around)),
+        (cut[owner], low[:, None] + along[:, None] * (high - low)[:, None], np.outer(width * (high - low)[:, 1], part)),
+        (bare, points[bare, None], np.ones(1)),
+    )
+    places = np.concatenate([each.reshape(-1, 2) for _, each, _ in found])
+    row = np.concatenate([np.repeat(which, each.shape[1]) for which, each, _ in found])
+    share = np.concatenate([np.broadcast_to(part, each.shape[:2]).ravel() for _, each, part in found])
+    mean = csr_matrix((share / np.bincount(row, share)[row], (row, np.arange(len(row)))), (len(points), len(row)))
+    offset = places - points[row]
+    centre = mean @ offset
+    about = offset - centre[row]
+    spread_out = (mean @ (about[:, :, None] * about[:, None]).reshape(-1, 4)).reshape(-1, 2, 2)
     lean = np.einsum("pij,pj->pi", np.linalg.pinv(spread_out, hermitian=True), centre)
-    share = share * (1.0 - np.einsum("pki,pi->pk", about, lean))
-    row, column = np.nonzero(share)
-    weights = csr_matrix((share[row, column], (row, np.arange(len(row)))), shape=(len(points), len(row)))
-    return places[row, column], weights
+    return places, mean.multiply(1.0 - (about * lean[row]).sum(axis=1)).tocsr()
 
 
-def _whole_disks(space: Any, points: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Radius (n_points,) of the largest disk around each point that lies on the body, at most ``radius``."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
-    spokes = np.column_stack([np.cos(turn), np.sin(turn)])
+def _outlined(space: Any, off: float) -> Any:
+    """The body as a polygon, whose sides are off its curved edges by at most so much."""
+    _, number, counts = sides_of(space.vertices)
+    cell, side = np.nonzero(counts[number] == 1)
+    ends = np.eye(3)[np.stack([side, (side + 1) % 3], axis=1)]  # (n_facets, 2, 3) area coordinates
+    longest = float(np.linalg.norm(np.diff(ends @ space.corners[cell], axis=1), axis=2).max())
+    off = max(off, 1e-7 * longest)  # the curves are known no better
+    n = int(np.sqrt(0.1 * longest / off)) + 1 if space.curved.any() else 1
+    step = np.linspace(0.0, 1.0, n + 1)[:, None]
+    area = (1.0 - step) * ends[:, :1] + step * ends[:, 1:]
+    lines = shapely.linestrings(space.points_along(cell, area, np.zeros((1, 1, 3)))[0])
+    return shapely.build_area(shapely.multilinestrings(lines)).simplify(off)
 
-    def on_body(some: np.ndarray, size: np.ndarray) -> np.ndarray:
-        places = points[some, None] + size[:, None, None] * spokes
-        return np.asarray(space.locate(places.reshape(-1, 2))[1].reshape(len(some), -1).all(axis=1))
 
-    found = radius.copy()
-    cut = np.flatnonzero(~on_body(np.arange(len(points)), radius))
-    found[cut] = _last_inside(on_body, cut, np.zeros(len(cut)), radius[cut])
-    return found
+def _chords(pieces: Any, disks: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Lowest and highest places (n, 2) of chords along y of pieces of disks, the widths (n,) they stand for, and whose.
 
-
-def _arcs_inside(space: Any, points: np.ndarray, away: np.ndarray, arcs: int) -> tuple[np.ndarray, np.ndarray]:
-    """First and last angle (n_points, rings, arcs) [rad] of arcs around points, as far as they lie on the body.
-
-    ``away`` (n_points, rings) are the radii; an arc of which one end is beyond the edge is cut there.
+    Two stand for the strip between one corner of a piece or its disk and the next, where they end on straight lines.
     """
-    ends = np.linspace(0.0, 2.0 * np.pi, arcs + 1)
-    shape = (*away.shape, arcs)
-    first, last = (np.broadcast_to(each, shape).reshape(-1).copy() for each in (ends[:-1], ends[1:]))
-    middle, away = np.repeat(points, shape[1] * arcs, axis=0), np.repeat(away.ravel(), arcs)
-
-    def on_body(some: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        at = middle[some] + away[some, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-        return np.asarray(space.locate(at)[1])
-
-    starts = away == 0.0
-    starts[~starts] = on_body(np.flatnonzero(~starts), first[~starts])
-    stops = np.roll(starts.reshape(shape), -1, axis=2).ravel()
-    last[~starts & ~stops] = first[~starts & ~stops]
-    cut = np.flatnonzero(starts != stops)
-    found = _last_inside(on_body, cut, *np.where(starts[cut], [first[cut], last[cut]], [last[cut], first[cut]]))
-    first[cut], last[cut] = np.where(starts[cut], [first[cut], found], [found, last[cut]])
-    return first.reshape(shape), last.reshape(shape)
-
-
-def _last_inside(on_body: Any, some: np.ndarray, inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
-    """Where the body ends (n,) between values inside and outside, by halving."""
-    for _ in range(HALVINGS if some.size else 0):
-        middle = 0.5 * (inside + outside)
-        lies = on_body(some, middle)
-        inside, outside = np.where(lies, middle, inside), np.where(lies, outside, middle)
-    return inside
+    both = shapely.geometrycollections(np.stack([pieces, disks], axis=1))
+    corners, owner = shapely.get_coordinates(both, return_index=True)
+    order = np.lexsort([corners[:, 0], owner])
+    x, owner = corners[order, 0], owner[order]
+    strip = np.flatnonzero((np.diff(owner) == 0) & (np.diff(x) > ROUNDING))
+    node, weight = gauss_rule(2)
+    width = np.diff(x)[strip, None]
+    at, owner, width = (x[strip, None] + width * node).ravel(), np.repeat(owner[strip], 2), (width * weight).ravel()
+    lines = shapely.linestrings(np.stack([np.column_stack([at, np.full(len(at), end)]) for end in (-1.0, 1.0)], axis=1))
+    found, of = shapely.get_parts(shapely.intersection(lines, pieces[owner]), return_index=True)
+    found, of = found[~shapely.is_empty(found)], of[~shapely.is_empty(found)]
+    low, high = shapely.bounds(found).reshape(-1, 2, 2).transpose(1, 0, 2)
+    return low, high, width[of], owner[of]

@@ -264,3 +264,28 @@ def test_forces_beside_an_edge_act_over_their_disk_as_the_edge_cuts_it(turn, bes
     lean = -moment[1] / moment[2]
     exact = (moment[2] + lean * moment[3]) / (moment[0] + lean * moment[1])
     assert_allclose(weights @ ((places - point) @ way)[:, 0] ** 2, exact * radius**2, rtol=1e-3)  # 2e-4
+
+
+@pytest.mark.parametrize(("corner", "beside"), [
+    ((0.0, 0.0), (0.57, 0.1)),  # over the radius; once 4 % off
+    ((1.0, 0.6), (-0.06, -0.4)),
+    ((0.4, 0.6), (0.06, -0.1)),  # re-entrant
+    ((0.6, 0.2), (0.0, 0.4)),  # a hole a third as wide as the disk
+    ])  # fmt: skip
+def test_forces_in_corners_and_beside_small_holes_act_over_their_disk_as_the_edges_cut_it(corner, beside):
+    outline = [(0, 0), (1, 0), (1, 0.6), (0.4, 0.6), (0.4, 1), (0, 1)]
+    turn = np.linspace(0.0, 2.0 * np.pi, 33)[:-1]
+    hole = np.array([0.6, 0.2]) + 0.01 * np.column_stack([np.cos(turn), np.sin(turn)])
+    system, radius = fi.assemble(fi.mesh.polygon(outline, [hole]), fi.Plate(UNIT, 0.1), theory="mindlin"), 0.03
+    point = np.array(corner) + np.array(beside) * radius
+    places, weights = interpolation.spread_forces(system.space, system.frame.local(point[None]), np.array([radius]))
+    x, y = (each.ravel() for each in np.meshgrid(*[np.arange(-0.9995, 1.0, 1e-3)] * 2))  # over the radius
+    at = point[:, None] + radius * np.array([x, y])
+    on = (x**2 + y**2 < 1.0) & ~((at[0] > 0.4) & (at[1] > 0.6)) & (at > 0.0).all(axis=0) & (at[0] < 1.0)
+    on &= np.hypot(at[0] - 0.6, at[1] - 0.2) > 0.01
+    about = np.array([x[on], y[on]])
+    lean = np.linalg.solve(np.cov(about, bias=True), about.mean(axis=1))
+    share = (1.0 - lean @ (about - about.mean(axis=1)[:, None])) / on.sum()
+    found = (system.frame.to_metres(places) - point) / radius
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        assert_allclose(weights @ (found[:, i] * found[:, j]), share @ (about[i] * about[j]), atol=1e-3)
