@@ -113,7 +113,7 @@ def in_air(
     omega *= better
     # the two grids agree by chance where the shift changes its sign, so that no mode is surer than those below it
     heavier = modes.omega[modes.n_rigid :] / omega - 1.0
-    doubt = np.maximum.accumulate(np.abs(shift)) + missed[modes.n_rigid :] * np.abs(heavier)
+    doubt = 1.5 * (np.maximum.accumulate(np.abs(shift)) + missed[modes.n_rigid :] * np.abs(heavier))
     unsure = unsure + _mistaken(found, mix, omega, doubt)  # of a pair at one frequency both of `own` may be one
     side = "both sides" if sides == 2 else "one side"
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
@@ -293,8 +293,9 @@ def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     """Every shape at points on a square lattice around the body, (n_modes, nx, ny) [kg**-0.5]; zero beside it.
 
     Squares cut by the rim count by the part of them on the body, in four pieces each way: undivided, the added masses
-    of free plates err ten times as much. Also returned is how much of each mode's energy (n_modes,) [-] the area so
-    missed holds.
+    of free plates err ten times as much. What the integrals of a shape and its first moments then lack is spread over
+    the body, as low modes between free edges hardly radiate but by what these leave. Also returned is how much of each
+    mode's energy (n_modes,) [-] the area missed holds.
     """
     places, inside = lattice(shapes, spacing, SAMPLES[0] * SAMPLES[1])
     rim = binary_dilation(inside, np.ones((3, 3))) & ~binary_erosion(inside, np.ones((3, 3)))
@@ -307,9 +308,16 @@ def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     samples = np.zeros((at_rim.shape[1], *inside.shape))
     samples[:, inside & ~rim] = shapes.at(places[inside & ~rim]).T
     samples[:, rim] = values.reshape(rim.sum(), 16, -1).mean(axis=1).T
-    area = (inside & ~rim).sum() + covered.mean() * rim.sum()
+    share = inside.astype(float)
+    share[rim] = covered.reshape(-1, 16).mean(axis=1)
+    points, weight = shapes.quadrature(1.0 / spacing)
+    middle = points.mean(axis=0)
+    known, there = (np.insert(each - middle, 0, 1.0, axis=-1) for each in (points, places))  # 1, x and y
+    lacking = (weight * known.T) @ shapes.at(points) - spacing**2 * np.einsum("xyi,nxy->in", there, samples)
+    gram = spacing**2 * np.einsum("xyi,xyj,xy->ij", there, there, share)
+    samples += np.einsum("in,xyi,xy->nxy", np.linalg.solve(gram, lacking), there, share)
     energy = (samples**2).sum(axis=(1, 2)) * covered.sum()
-    missed = abs(area - shapes.quadrature(0.0)[1].sum() / spacing**2)
+    missed = abs(share.sum() - weight.sum() / spacing**2)
     return samples, missed * (at_rim**2).sum(axis=0) / energy
 
 
