@@ -60,11 +60,13 @@ def pressure(
     roots = free_motion.roots(response.target.omega[audible], response.target.damping_ratio[audible])
     last = delay.max()
     early = last - delay  # [s] how much sooner it arrives than the last: over a long way decays cannot be undone
-    some = np.array_split(np.arange(len(early)), 1 + len(early) // BLOCK)  # to limit the memory
-    delayed = {
-        order: np.array([sum(np.einsum("km,km->m", w[i], np.exp(np.outer(early[i], r))) for i in some) for r in roots])
-        for order, w in orders.items()
-    }
+    two = roots[0].imag == 0.0  # modes that do not swing; the second root of all others is the conjugate of the first
+    delayed = {order: np.zeros(roots.shape, complex) for order in orders}
+    for some in np.array_split(np.arange(len(early)), 1 + len(early) // BLOCK):  # to limit the memory
+        for k, which in enumerate((np.ones(len(two), bool), two)):
+            sooner = np.exp(np.outer(early[some], roots[k, which]))
+            for order, weights in orders.items():
+                delayed[order][k, which] += np.einsum("km,km->m", weights[some][:, which], sooner)
     found = []
     for hit, part, local in parts(response, times):
         n_first = int(np.searchsorted(local, hit.time[-1] + last, side="right"))
