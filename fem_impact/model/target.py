@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -274,8 +274,8 @@ class Target:
         return float(((bending * squared + tension) * squared / inertia).min() ** 0.5 / (2.0 * np.pi))
 
     @cached_property
-    def _known(self) -> Remembered:  # meshes and their unknowns: a plan counts those of two or three, its run uses them
-        return Remembered(6)
+    def _known(self) -> Remembered:  # first modes; meshes and their unknowns, of which a plan counts two or three
+        return Remembered(7)
 
     def _meshed(self, size: float, stages: Stages) -> Mesh:
         """The mesh with elements of another size [m]."""
@@ -337,6 +337,17 @@ class Target:
         reach: dict[str, Any] = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
         if self.modes is not None:
             return self.modes.truncated(**reach)
+        find = partial(self._found, reach, tolerance, size, first, stages, keep)
+        if reach == {"n_modes": FIRST_LOOK} and first is None and keep is None:  # plans of several blows share them
+            return self._known.recall((tolerance, size), find)
+        return find()
+
+    def _found(
+        self, reach: Mapping[str, Any], tolerance: float, size: float | None, first: Modes | None,
+        stages: Stages | None, keep: Any,
+    ) -> Modes:  # fmt: skip
+        """What `find` finds of a body whose modes are not known."""
+        max_frequency = reach.get("max_frequency")
         insisted, wanted = size is not None or self.size_stated, None
         if self.kind == "analytic" and (size is None or self.source == "analytic"):
             body = None
@@ -354,8 +365,7 @@ class Target:
                 return self.closed(**reach)
             if wanted is None:
                 return finding.find_modes(body, **reach, keep=keep)
-            number = None if max_frequency is not None else n_modes
-            return finding.modes_of(refinement.refine(body, number, max_frequency, wanted, of_mesh=True))
+            return finding.modes_of(refinement.refine(body, reach.get("n_modes"), max_frequency, wanted, of_mesh=True))
 
     def number_below(self, modes: Modes, limit: float) -> float:
         """About how many modes there are below a frequency [Hz], by Weyl's law from the first ones, all as struck.

@@ -148,10 +148,10 @@ def plan_sequence(scene: "Scene", watch: Watch | None = None, **changes: Any) ->
         keys.append(repr([part.values.get("striker"), part.values.get("contact"), blow["at"]]))
         other = fastest.get(keys[-1], single)
         fastest[keys[-1]] = single if blow["speed"] >= other.blow.values["speed"] else other
-    plans = {}
+    plans, target = {}, alone[0].built.target  # of all strokes, so that its first modes are found once
     for key, single in fastest.items():
         try:
-            plans[key] = single.plan(watch=watch, **wanted)
+            plans[key] = replace(single.built, target=target).plan(watch, **wanted)
         except ValueError as error:  # of a scene with one blow only
             before, file, said = str(error).partition(f"{check.line(str(scene.path))}: [strike] ")
             if before or not file:

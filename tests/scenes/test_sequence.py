@@ -88,6 +88,11 @@ def test_strokes_alike_share_the_plan_of_the_fastest(path):
     assert planned.plans[0].blow.arguments["speed"] == 3
 
 
+def test_the_first_modes_of_the_body_are_found_once_for_all_strokes(path):
+    first, second = scene.load_scene(path).plan_strokes().plans
+    assert first.first is not None and first.first is second.first
+
+
 def test_a_stroke_beside_the_body_is_named(path):
     path.write_text(TABLES.replace("at = [0.2, 0.1]", "at = [0.6, 0.1]"))
     with pytest.raises(ValueError, match=r"flam.toml: \[\[stroke\]\] 1 at must lie on the body"):
