@@ -29,10 +29,9 @@ def is_curved(ends: np.ndarray, middles: np.ndarray) -> np.ndarray:
 
 def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
     """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
-    result, power = np.zeros((*x.shape, highest + 1)), np.ones(x.shape)
+    result = np.zeros((*x.shape, highest + 1))
     for k in range(order, highest + 1):
-        result[..., k] = perm(k, order) * power
-        power = power * x
+        result[..., k] = perm(k, order) * x ** (k - order)
     return result
 
 

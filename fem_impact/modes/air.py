@@ -165,7 +165,7 @@ def _extrapolated(
     ``sparse`` are those of the same mixtures, sampled at points as much farther apart as the cells are larger, so that
     all errors shrink with their area. ``coarse`` are those of the mixtures found on the coarse grid. What both change
     may agree by chance, so that no mode is surer, relative to its damping, than those below it. The true errors were at
-    most 0.66 of those stated, of 41 plates.
+    most 0.74 of those stated, of 113 plates, and of one 1.85 times.
     """
     some = np.maximum(fine, np.finfo(float).tiny)
     apart = [np.maximum.accumulate(np.abs(each - fine) / some) for each in (sparse, coarse)]
