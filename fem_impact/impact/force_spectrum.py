@@ -124,11 +124,14 @@ def transform_impulses(time: np.ndarray, impulse: np.ndarray, step: float, count
     near = np.rint(place)
     first = np.append(0, np.flatnonzero(near[1:] != near[:-1]) + 1)  # node of every cell
     cell, beside = near[first].astype(int) % n_cells, place - near
-    turn = 2.0 * np.pi / n_cells * np.arange(count)
-    factor, total = np.ones(count, complex), np.zeros(count, complex)
-    for k in range(22):  # for phases up to pi / 2, those of a cell's ends, the series errs by 2e-17
-        total += factor * fft.rfft(np.bincount(cell, np.add.reduceat(impulse, first), n_cells))[:count]
-        impulse, factor = impulse * beside, factor * turn * (-1j / (k + 1.0))
+    sums = [np.add.reduceat(impulse, first)]
+    for k in range(1, 22):  # for phases up to pi / 2, those of a cell's ends, a series of so many terms errs by 2e-17
+        impulse = impulse * (beside / k)
+        sums.append(np.add.reduceat(impulse, first))
+    spectra = fft.rfft([np.bincount(cell, each, n_cells) for each in sums])[:, :count]
+    turn, total = -2j * np.pi / n_cells * np.arange(count), spectra[-1]
+    for spectrum in spectra[-2::-1]:
+        total = total * turn + spectrum
     return total
 
 
