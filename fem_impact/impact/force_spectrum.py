@@ -128,10 +128,10 @@ def transform_impulses(time: np.ndarray, impulse: np.ndarray, step: float, count
     for k in range(1, 22):  # for phases up to pi / 2, those of a cell's ends, a series of so many terms errs by 2e-17
         impulse = impulse * (beside / k)
         sums.append(np.add.reduceat(impulse, first))
-    spectra = fft.rfft([np.bincount(cell, each, n_cells) for each in sums])[:, :count]
-    turn, total = -2j * np.pi / n_cells * np.arange(count), spectra[-1]
-    for spectrum in spectra[-2::-1]:
-        total = total * turn + spectrum
+    turn, total = -2j * np.pi / n_cells * np.arange(count), np.zeros(count, complex)
+    for some in np.array_split(sums[::-1], min(22, 1 + 22 * n_cells // 2**22)):  # to limit the memory
+        for spectrum in fft.rfft([np.bincount(cell, each, n_cells) for each in some]):
+            total = total * turn + spectrum[:count]
     return total
 
 
