@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base import check
+from .._base.remembered import gauss_rule
 from .material import Material
 
 SHEAR = 5.0 / 6.0  # [-] shear coefficient of plates: shear stress is parabolic over the thickness (Reissner 1945)
@@ -51,11 +52,11 @@ def layered_shear_stiffness(layers: Sequence[Layer], i: int) -> float:
     h, z = (np.array([getattr(layer, name) for layer in layers]) for name in ("thickness", "middle"))
     z = z - (stretch * h) @ z / (stretch @ h)
     rigidity = (stretch * h) @ (z**2 + h**2 / 12.0)
-    node, weight = np.polynomial.legendre.leggauss(3)  # exact: the square of a quadratic
-    s = 0.5 * h[:, None] * (1.0 + node)  # below the top of each layer
+    x, dx = gauss_rule(3)  # exact: the square of a quadratic
+    s = h[:, None] * x  # below the top of each layer
     above = np.concatenate([[0.0], np.cumsum(stretch * h * z)[:-1]])
     moment = above[:, None] + stretch[:, None] * s * ((z + 0.5 * h)[:, None] - 0.5 * s)
-    return float(rigidity**2 / ((soft * 0.5 * h) @ (moment**2 @ weight)))
+    return float(rigidity**2 / ((soft * h) @ (moment**2 @ dx)))
 
 
 def checked_layers(layers: Any) -> tuple[Layer, ...]:

@@ -129,7 +129,7 @@ def transform_impulses(time: np.ndarray, impulse: np.ndarray, step: float, count
         impulse = impulse * (beside / k)
         sums.append(np.add.reduceat(impulse, first))
     turn, total = -2j * np.pi / n_cells * np.arange(count), np.zeros(count, complex)
-    for some in np.array_split(sums[::-1], min(22, 1 + 22 * n_cells // 2**22)):  # to limit the memory
+    for some in np.array_split(sums[::-1], min(len(sums), 1 + len(sums) * n_cells // 2**22)):  # to limit the memory
         for spectrum in fft.rfft([np.bincount(cell, each, n_cells) for each in some]):
             total = total * turn + spectrum[:count]
     return total

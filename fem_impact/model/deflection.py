@@ -16,7 +16,6 @@ Berger (1955), J. Appl. Mech. 22, 465-472; Chu and Herrmann (1956), J. Appl. Mec
 """
 
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -323,10 +322,11 @@ def _share(body: Known, integrals: Bending, moved: np.ndarray) -> float:
     return float(energy / berger) if berger else _crude_share(body)
 
 
-@lru_cache(maxsize=4)
 def _forms(modes: Modes, most: int = membrane.SWINGING) -> Stretching:
-    """Stretching of the first modes that bend, as in `modes.stretching`; it takes a second."""
-    return stretch(modes.truncated(n_modes=min(modes.n_modes, modes.n_rigid + most)))
+    """Stretching of the first modes that bend, as in `modes.stretching`; it takes a second, and they remember it."""
+    n_modes = min(modes.n_modes, modes.n_rigid + most)
+    found: Stretching = modes.known.recall(("stretching", n_modes), lambda: stretch(modes.truncated(n_modes=n_modes)))
+    return found
 
 
 def _share_of_bending(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -95,13 +95,16 @@ def in_air(
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
     share, spacing = 1.0 if baffled else 0.5, _spacing(modes, float(modes.shapes.quadrature(0.0)[1].sum()), speed)
-    samples, missed = _sampled(modes.shapes, spacing)
+    points, sizes = modes.shapes.quadrature(2.0 * np.pi / (PER_WAVE * SAMPLES[0] * spacing))
+    whole = points, sizes, modes.shapes.at(points)
+    samples, missed = _sampled(modes.shapes, spacing, whole)
     weight = density * sides * share / (2.0 * np.pi)
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
     (omega, own), (lower, mixed) = found.solved(), other.solved()
     shift = lower / omega - 1.0
     rarer = SAMPLES[1] / SAMPLES[0] * spacing
-    sparse = _Air(modes, _strengths(_sampled(modes.shapes, rarer)[0], rarer, SAMPLES[0]), other.size, weight, speed)
+    few = _strengths(_sampled(modes.shapes, rarer, whole)[0], rarer, SAMPLES[0])
+    sparse = _Air(modes, few, other.size, weight, speed)
     radiated, unsure = _extrapolated(
         found.damping(own, omega), sparse.damping(own, omega), other.damping(mixed, lower), missed[modes.n_rigid :]
     )
@@ -289,13 +292,16 @@ class _Air:
             vectors[window, i] = own if own[np.abs(own).argmax()] > 0.0 else -own
 
 
-def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(
+    shapes: Shapes, spacing: float, whole: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
     """Every shape at points on a square lattice around the body, (n_modes, nx, ny) [kg**-0.5]; zero beside it.
 
     Squares cut by the rim count by the part of them on the body, in four pieces each way: undivided, the added masses
     of free plates err ten times as much. What the integrals of a shape and its first moments then lack is spread over
-    the body, as low modes between free edges hardly radiate but by what these leave. Also returned is how much of each
-    mode's energy (n_modes,) [-] the area missed holds.
+    the body, as low modes between free edges hardly radiate but by what these leave; ``whole`` are points [m], sizes
+    [m^2] and shapes that sum over it. Also returned is how much of each mode's energy (n_modes,) [-] the area missed
+    holds.
     """
     places, inside = lattice(shapes, spacing, SAMPLES[0] * SAMPLES[1])
     rim = binary_dilation(inside, np.ones((3, 3))) & ~binary_erosion(inside, np.ones((3, 3)))
@@ -310,10 +316,10 @@ def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     samples[:, rim] = values.reshape(rim.sum(), 16, -1).mean(axis=1).T
     share = inside.astype(float)
     share[rim] = covered.reshape(-1, 16).mean(axis=1)
-    points, weight = shapes.quadrature(1.0 / spacing)
+    points, weight, exact = whole
     middle = points.mean(axis=0)
     known, there = (np.insert(each - middle, 0, 1.0, axis=-1) for each in (points, places))  # 1, x and y
-    lacking = (weight * known.T) @ shapes.at(points) - spacing**2 * np.einsum("xyi,nxy->in", there, samples)
+    lacking = (weight * known.T) @ exact - spacing**2 * np.einsum("xyi,nxy->in", there, samples)
     gram = spacing**2 * np.einsum("xyi,xyj,xy->ij", there, there, share)
     samples += np.einsum("in,xyi,xy->nxy", np.linalg.solve(gram, lacking), there, share)
     energy = (samples**2).sum(axis=(1, 2)) * covered.sum()

@@ -371,9 +371,10 @@ class _Engine:
         edges = np.flatnonzero(np.any(np.diff(group[:, order], axis=1) != 0, axis=0)) + 1
         parts = np.split(order, edges)  # of one family and step each
         for limit in LENGTHS:
-            now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
             if limit == LENGTHS[-1]:  # the work is that of its square: the modal engine takes fewer steps with loss
-                now = now & (self.law["loss"][cells] == 0.0)
+                now = todo & (self.law["loss"][cells] == 0.0)
+            else:
+                now = todo if length is None else todo & (length < limit)
             track = many_blows.made_track(limit, self.n_modes)
             for part in (each[now[each]] for each in parts):
                 if not part.size:
