@@ -9,7 +9,6 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.ndimage import maximum_filter1d
 from scipy.optimize import brentq
-from scipy.sparse.linalg import LinearOperator
 
 from .._base import check, identity
 from .._base import kept as keeping
@@ -147,27 +146,26 @@ def _pairs(
     flexibility = Flexibility.of(system)
     n_rigid, rate = system.rigid.shape[1], system.frame.rate
     limit = None if max_frequency is None else (2.0 * np.pi * max_frequency / rate) ** 2
-    inert = shallow.mass_in_plane(system) if system.ribbed else None  # without ribs left out, as formulas of shells do
+    inert = shallow.whole_mass(system) if system.ribbed else None  # else what moves in the plane is left out
+    mass: Any = system.M if inert is None else inert
     if n_modes is None:
         assert limit is not None
-        # with the mass in the plane, of which a drift spares some, there are no more below
-        n_modes = count_below(system.K, system.M if inert is None else system.M + inert.whole, limit)
+        # of ribbed plates, as a drift spares some of their mass, there are no more below
+        n_modes = count_below(system.K, system.M if inert is None else inert.whole, limit)
         if n_modes == 0:
             raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
     if n_modes <= n_rigid:
         values, vectors = np.zeros(0), np.zeros((system.n_dofs, 0))
     else:
         n = n_modes - n_rigid
-        many = system.mesh.dimension == 1 and n > FIRST_SLICE
-        if inert is not None:  # with the mass in the plane others may be among them
-            n, limit = max(n, min(n + 2 * BLOCK, len(flexibility.inertial) - n_rigid)), None
-        values, vectors = by_slices(flexibility, n) if many else _complete_eigenpairs(system, flexibility, n, limit)
+        if system.mesh.dimension == 1 and n > FIRST_SLICE:
+            values, vectors = by_slices(flexibility, n)
+        else:
+            values, vectors = _complete_eigenpairs(system, flexibility, inert, n, limit)
         if system.strain is not None:  # more accurate than K if there are tiny triangles
-            values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, system.M @ vectors)
+            values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, mass @ vectors)
             order = np.argsort(values, kind="stable")
             values, vectors = values[order], vectors[:, order]
-        if inert is not None and len(values):
-            values, vectors = with_mass_in_plane(system, inert, flexibility, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     if max_frequency is not None:
         omega = omega[omega <= 2.0 * np.pi * max_frequency]
@@ -250,16 +248,16 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
 
 
 def _complete_eigenpairs(
-    system: System, flexibility: Flexibility, n: int, limit: float | None
+    system: System, flexibility: Flexibility, inert: shallow.PlaneMass | None, n: int, limit: float | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the n lowest flexible eigenpairs without missing any.
+    """Find the n lowest flexible eigenpairs without missing any, of a ribbed plate with all its mass.
 
     If a limit is given, n is the number of modes below it. Otherwise inertia confirms the number below a gap after the
     last mode. In a dense cluster the first search may miss some modes; it is then repeated for more modes, with a
     stricter residual, twice at most.
     """
     n_rigid = flexibility.rigid.shape[1]
-    moving = len(flexibility.inertial)
+    moving = len(flexibility.inertial) if inert is None else system.n_dofs
     available = moving - n_rigid
     if n > available:
         size = size_for(system, n + n_rigid, None, None)
@@ -271,8 +269,12 @@ def _complete_eigenpairs(
             f"for {n + n_rigid} modes; {advice}"
         )
     more = min(n + (BLOCK if limit is None else 0), available)
+    mass, spared = (system.M, 0) if inert is None else (inert.whole, inert.spared.shape[1])
     for allowed in (RESIDUAL, STRICT, STRICT):
-        values, vectors = lowest(flexibility, more, allowed)
+        if inert is None:
+            values, vectors = lowest(flexibility, more, allowed)
+        else:
+            values, vectors = _lowest_of_ribbed(flexibility, inert, more, allowed)
         if more == available:
             return values[:n], vectors[:, :n]
         if limit is not None:
@@ -280,8 +282,8 @@ def _complete_eigenpairs(
         else:
             gaps = np.diff(values[n - 1 :]) / values[n - 1 : -1]
             at = n - 1 + int(gaps.argmax())
-            below, found = count_below(system.K, system.M, 0.5 * (values[at] + values[at + 1])) - n_rigid, at + 1
-        if below == found:
+            below, found = count_below(system.K, mass, 0.5 * (values[at] + values[at + 1])) - n_rigid, at + 1
+        if below - spared <= found <= below:  # with all its mass each drift lowers a mode, by less than to the next
             return values[:n], vectors[:, :n]
         more = min(max(below, more) + 4 * BLOCK, available)
     raise check.SimulationError(
@@ -291,35 +293,27 @@ def _complete_eigenpairs(
 
 
 @one_thread
-def with_mass_in_plane(
-    system: System, inert: shallow.PlaneMass, flexibility: Flexibility, values: np.ndarray, vectors: np.ndarray
+def _lowest_of_ribbed(
+    flexibility: Flexibility, inert: shallow.PlaneMass, n: int, residual: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (n,) and vectors (n_dofs, n), with the mass in the plane of a ribbed plate.
-
-    With it the plane has modes of its own, and the space is that of the vectors and of the lowest of both. The inverse
-    problem keeps the digits of the lowest.
-    """
-    whole, n, sprung = inert._replace(whole=inert.whole + system.M), len(values), flexibility.sprung
-    pulled = system.M @ sprung
+    """`lowest` of a ribbed plate, whose plane has mass and modes of its own; the inverse problem keeps the lowest."""
+    pulled = inert @ flexibility.sprung
+    sprung, pulled = np.linalg.solve(
+        np.linalg.cholesky(flexibility.sprung.T @ pulled), [flexibility.sprung.T, pulled.T]
+    )
 
     def unsprung(loads: np.ndarray) -> np.ndarray:
-        return flexibility.bent(flexibility.solve(loads - pulled @ (sprung.T @ loads)))[0]
+        found = flexibility.solve(loads - pulled.T @ (sprung @ loads))
+        return found - sprung.T @ (pulled @ found)
 
-    mass = LinearOperator(system.K.shape, matvec=whole, matmat=whole, dtype=float)
-    available = system.n_dofs - flexibility.rigid.shape[1] - sprung.shape[1]
-    basis = vectors * values**-0.5
-    fresh = krylov(unsprung, mass, min(n + BLOCK, available), available, RESIDUAL)
-    for _ in range(2):  # what once leaves of the vectors in a direction that nearly is theirs is rounding
-        energy = flexibility.products(np.column_stack([basis, fresh]))
-        unit = np.diag(energy)[n:] ** -0.5
-        cross = energy[:n, n:] * unit
-        size, turn = eigh(energy[n:, n:] * np.outer(unit, unit) - cross.T @ cross)
-        some = size > SAME * size[-1]
-        fresh = (fresh * unit - basis @ cross) @ (turn[:, some] / np.sqrt(size[some]))
-    basis = np.column_stack([basis, fresh])
-    kinetic = basis.T @ whole(basis)
-    size, turn = (part[..., : -n - 1 : -1] for part in eigh(0.5 * (kinetic + kinetic.T)))
-    return 1.0 / size, basis @ (turn / np.sqrt(size))
+    available = flexibility.K.shape[0] - flexibility.rigid.shape[1] - len(sprung)
+    bent = krylov(unsprung, inert, min(n, available), available, residual)
+    basis = np.column_stack([flexibility.solve(pulled.T), bent])
+    energy, kinetic = flexibility.products(basis), basis.T @ (inert @ basis)
+    unit = np.diag(energy) ** -0.5
+    slowness, turn = eigh(0.5 * (kinetic + kinetic.T) * np.outer(unit, unit), energy * np.outer(unit, unit))
+    slowness, turn = slowness[: -n - 1 : -1], turn[:, : -n - 1 : -1]
+    return 1.0 / slowness, (basis * unit) @ (turn / np.sqrt(slowness))
 
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:

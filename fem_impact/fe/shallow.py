@@ -188,14 +188,24 @@ class PlaneMass(NamedTuple):
     whole: csc_matrix  # (n_dofs, n_dofs)
     spared: np.ndarray  # (n_dofs, n_drifts)
 
-    def __call__(self, vectors: np.ndarray) -> np.ndarray:
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.whole.shape
+
+    def __matmul__(self, vectors: np.ndarray) -> np.ndarray:
         """The mass times vectors (n_dofs, n)."""
         return self.whole @ vectors - self.spared @ (self.spared.T @ vectors)
 
 
 def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
     """What moves besides the deflection in vectors (n_dofs, n), times its mass (n_dofs, n), in the frame."""
-    return mass_in_plane(system)(vectors)
+    return mass_in_plane(system) @ vectors
+
+
+def whole_mass(system: Any) -> PlaneMass:
+    """All the mass of a ribbed plate."""
+    found = mass_in_plane(system)
+    return PlaneMass(found.whole + system.M, found.spared)
 
 
 def mass_in_plane(system: Any) -> PlaneMass:

@@ -28,7 +28,7 @@ from .._base.threads import one_thread
 from ..fe import plausible, point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise
-from ..fe.shallow import PlaneMass, mass_in_plane
+from ..fe.shallow import PlaneMass, whole_mass
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
 
@@ -93,11 +93,8 @@ class Krylov:
         self.system = system
         self.shift = (shift / system.frame.rate) ** 2  # s**2 in the frame
         self._moving = system.M @ system.rigid
-        self._mass = PlaneMass(system.M, np.zeros((system.n_dofs, 0)))
+        self._mass = whole_mass(system) if system.ribbed else PlaneMass(system.M, np.zeros((system.n_dofs, 0)))
         self._eased, self._pushed = self._mass.spared, system.rigid
-        if system.ribbed:
-            inert = mass_in_plane(system)
-            self._mass = PlaneMass(system.M + inert.whole, inert.spared)
         self._factors = factorise(system.K + self.shift * self._mass.whole)
         if system.ribbed:
             spared = self._mass.spared
@@ -168,7 +165,7 @@ class Krylov:
             if cleared is None:
                 return self._extended(count)
             new = cleared
-        heavy = self._mass(new)
+        heavy = self._mass @ new
         gram = new.T @ heavy
         length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
         scaled = gram / np.outer(length, length)
@@ -196,7 +193,7 @@ class Krylov:
         start, end = self._latest[1:]
         latest = end - start
         both = np.vstack([self.vectors[start:end], new.T])
-        heavy = np.vstack([self._carried[:, -latest:].T, self._mass(new).T])
+        heavy = np.vstack([self._carried[:, -latest:].T, (self._mass @ new).T])
         rows, worst = max(1, 2**20 // (8 * both.shape[1])), 0.0  # a piece that fits into the cache of a core
         for i in range(0, start, rows):  # a few rows at a time: memory is read once for both products
             known = self.vectors[i : min(i + rows, start)]
@@ -208,7 +205,7 @@ class Krylov:
             self._period = self._due = max(1, self._period // 4)
             return None
         self.vectors[start:end] = both[:latest]
-        self._carried[:, -latest:] = self._mass(both[:latest].T)
+        self._carried[:, -latest:] = self._mass @ both[:latest].T
         new = both[latest:] - (both[latest:] @ self._carried[:, -latest:]) @ both[:latest]
         self._period = max(1, self._period // 2) if worst > 1e-11 else self._period + 1
         self._due = self._period
@@ -227,7 +224,7 @@ class Krylov:
         inverse = self.projected[:count, :count].copy()
         inverse = 0.5 * (inverse + inverse.T)
         latest = self.vectors[count - last : count].T
-        pushed = self.system.K @ latest + self.shift * self._mass(latest)  # (n_dofs, last)
+        pushed = self.system.K @ latest + self.shift * (self._mass @ latest)  # (n_dofs, last)
         stiff = self.vectors[band] @ pushed
         rest = inverse[count - last :, band] @ stiff - np.eye(last)
         excess = np.linalg.solve(stiff[-last:].T, rest.T)  # rest = excess @ stiff[-last:]

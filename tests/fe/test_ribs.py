@@ -5,9 +5,11 @@ import pytest
 import references_shells as reference
 from comparing import refusing
 from references_panels import Order, Panel, levy_omegas, rectangular_rib
+from scipy.linalg import eigh
 
 import fem_impact as fi
-from fem_impact.fe import assembly, refinement
+from fem_impact.fe import assembly, refinement, shallow
+from fem_impact.fe.system import System
 
 E, NU, RHO = 70e9, 0.3, 2700.0
 ALUMINIUM = fi.Material(E=E, nu=NU, rho=RHO)
@@ -46,7 +48,7 @@ def test_panels_with_a_rib_are_those_of_ritzs_method(width, monkeypatch):
     edges = (("hinged", "sliding"),) * 4
     body = Panel((0.4, 0.3), reference.isotropic(E, NU, thickness), RHO * thickness, edges, None, (rib,))
     exact = np.array([row[0] for row in levy_omegas(body, 8, Order(2, 16))])
-    monkeypatch.setattr(refinement, "with_mass_in_plane", lambda system, inert, flexibility, *pairs: pairs)
+    monkeypatch.setattr(System, "ribbed", False)
     system = panel(fi.Rib([(0.0, at), (0.4, at)], bar(width)), in_plane=SLIDING)
     found = fi.find_modes(system, n_modes=8, tolerance=1e-5)
     error = np.abs(found.omega / exact - 1.0)
@@ -69,6 +71,18 @@ def test_a_plate_with_a_thread_for_a_rib_has_the_modes_of_its_plane_among_those_
     assert (error < np.maximum(1.5 * found.frequency_error, 3e-8)).all()  # the thread weighs 2e-8 of the plate
     below = fi.find_modes(system, max_frequency=1.001 * exact[-1] / (2.0 * np.pi))
     np.testing.assert_allclose(below.omega, exact, rtol=1e-6)
+
+
+def test_modes_on_weak_springs_are_those_of_dense_algebra():
+    """Of which rounding hides the springs' own three motions, and leaves 1e-9 of the lowest others."""
+    thick, path, soft = 0.02, [(0.1, 0.0), (0.3, 0.3)], fi.Elastic(100.0)
+    sheet, rib = fi.mesh.rectangle(0.4, 0.3, size=0.1), fi.Rib(path, bar(0.03, 0.06))
+    system = fi.assemble(sheet, fi.Plate(ALUMINIUM, thick), {"boundary": soft}, ribs=[rib])
+    mass = shallow.whole_mass(system)
+    dense = eigh(system.K.toarray(), mass @ np.eye(system.n_dofs), eigvals_only=True, subset_by_index=(3, 29)) ** 0.5
+    found = fi.find_modes(system, n_modes=30).omega / system.frame.rate
+    assert system.sprung.shape[1] == 3 and found[2] < 1e-2 * found[3]
+    np.testing.assert_allclose(found[3:], dense, rtol=1e-7)
 
 
 def test_the_offset_decides_and_its_sign_does_not_on_a_flat_plate():
