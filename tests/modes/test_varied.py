@@ -1,7 +1,6 @@
 """What a changed section changes in modes: powers of uniform bodies, and differences of modes found again."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -57,9 +56,7 @@ def test_an_undercut_changes_modes_by_differences(theory):
     squares = difference(lambda each: each.shapes.at(AT[None])[0] ** 2)
     found = 2.0 * now.shapes.at(AT[None])[0] * change.shape
     assert_allclose(found[:2].sum(), squares[:2].sum(), rtol=1e-7)  # rigid motions may turn into one another
-    # the last mode is next to those left out, of which ten static solutions tell
-    assert_allclose(found[2:-1], squares[2:-1], rtol=1e-4, atol=1e-5 * np.abs(squares).max())
-    assert_allclose(found[-1], squares[-1], atol=1e-3 * np.abs(squares).max())
+    assert_allclose(found[2:], squares[2:], atol=1e-6 * np.abs(squares).max())
     exact = difference(lambda each: each.shapes.compliance(AT[None])[0, 0])
     assert_allclose(change.compliance, exact, rtol=1e-6)
 
@@ -92,14 +89,13 @@ def test_modes_that_share_a_frequency_answer_a_blow_smoothly_and_have_no_single_
     assert_allclose(whole, modes.frequencies[:3] / 3e-3, rtol=1e-6)  # alike for both of a pair
 
 
-@pytest.mark.parametrize("square", [0.0, 0.2])
-def test_terms_beyond_the_last_add_up_as_a_geometric_series(square):
-    """Each is a third of the one before; those of no size add nothing."""
-    shapes = SimpleNamespace(system=SimpleNamespace(M=np.diag([1.0, 2.0])))
-    term = np.array([0.3, 0.4])
-    last = varied._tail(shapes, [9.0 * term, 3.0 * term, term], np.array([square]))
-    assert_allclose(last, 1.0 / (1.0 - square / 3.0), rtol=1e-12)
-    assert_allclose(varied._tail(shapes, [0.0 * term, 0.0 * term], np.array([square])), 1.0)
+@pytest.mark.parametrize("count", [7, 10])
+def test_modes_change_alike_however_few_are_kept(count):
+    """The eleventh frequency of this plate is 2 % above the tenth; the elements are those for all 14."""
+    plate = fi.assemble(fi.mesh.rectangle(0.3, 0.28, size=0.05), grooved(0.1), {"boundary": "hinged"})
+    modes, change, at = fi.find_modes(plate, n_modes=14), along(grooved, 0.1, 1e-4), np.array([0.07, 0.11])
+    whole, few = (varied.changed_modes(each, change, at).shape for each in (modes, modes.truncated(n_modes=count)))
+    assert_allclose(few, whole[:count], atol=1e-9 * np.abs(whole).max())
 
 
 def test_a_spherical_panel_follows_its_radius_and_thickness():
