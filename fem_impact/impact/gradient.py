@@ -248,7 +248,8 @@ def read_quantities(
     for name, band in wanted:
         if name == "modal_energy":
             part, h = blow.body_slice(len(blow.bodies) - 1), blow.history
-            found.append(mode_energy(h.omega[part], h.end_q[part], h.end_p[part]))
+            state = h.state(max(impact.end for impact in blow.impacts))  # felt is followed for longer
+            found.append(mode_energy(h.omega[part], *state[:, part]))
         elif band is not None:
             time, impulse = _impulses(blow.history)
             if name == "spectral_centroid":

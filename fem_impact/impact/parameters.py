@@ -129,7 +129,7 @@ class Parameters(check.Brief):
                     "the bodies touch at the start, and even a small gap would change how they meet; give a gap"
                 )
             # modes may stand for those left out that would be others if any contact had a loss
-            alone = not self._lossy and any(ends.forms.start < ends.forms.stop for ends in hit.ends)
+            alone = not self._rated and any(ends.forms.start < ends.forms.stop for ends in hit.ends)
             sprung = alone or hit.history.law["compliance"][c] > 0.0
             if hit.contacts[c].loss == 0.0 and sprung:
                 barred[f"{name}.loss"] = (
@@ -151,9 +151,9 @@ class Parameters(check.Brief):
         return barred
 
     @property
-    def _lossy(self) -> bool:
-        """Whether any contact has a loss."""
-        return bool((self.hit.history.law["loss"] > 0.0).any())
+    def _rated(self) -> bool:
+        """Whether any contact's force depends on rates, so that modes in the place of others are critically damped."""
+        return any(contact.rated for contact in self.hit.contacts)
 
     @cached_property
     def why_no_target(self) -> str:
@@ -264,7 +264,7 @@ class Parameters(check.Brief):
         elif part == "damping_ratio":
             b = self.bodies[home]
             found.zeta[i, self._modes[b]] = self.hit.history.omega[self._modes[b]] > 0.0
-            found.zeta[i, self.hit.ends[b].forms] = not self._lossy  # else they are critically damped
+            found.zeta[i, self.hit.ends[b].forms] = not self._rated
         else:  # frequencies and mass grow with powers of the number
             faster, heavier = RESCALED.get(part) or self._powers[name]
             b, h = self.bodies.get(home, 1), self.hit.history.system

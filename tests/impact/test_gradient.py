@@ -407,6 +407,26 @@ def test_energy_left_in_modes_adds_up():
     assert_allclose(found["modal_energy"].slopes.sum(axis=1), start - left, rtol=1e-6)
 
 
+def test_felt_damps_the_mode_above_the_last_and_leaves_energy_as_its_force_ends():
+    """Felt is followed until it has risen; what is left in modes is told of the end of its force."""
+
+    def blow(first=50.0, zeta=0.2):
+        plate = fi.analytic.rectangle(1.55, 1.0, mass=0.5, first_frequency=first, n_modes=9, damping_ratio=zeta)
+        felt, how = fi.Contact.felt(1e7, 2.3, hysteresis=0.6, relaxation=1e-3), {"at": (0.45, 0.3), "speed": 1.0}
+        return fi.strike(plate, fi.Striker.rigid(0.03), felt, tolerance=1e-8, **how)
+
+    def told(hit):
+        return np.array([hit.restitution, hit.modal_energy([hit.impacts[-1].end])[0].sum()])
+
+    hit = blow()
+    found = hit.gradient(("restitution", "modal_energy"), ("target.first_frequency", "target.damping_ratio"))
+    assert_allclose([np.sum(each.value) for each in found.values()], told(hit), rtol=1e-9)
+    slopes = [each.slopes.reshape(2, -1).sum(axis=1) for each in found.values()]
+    for i, (near, far) in enumerate([[{"first": 50.05}, {"first": 49.95}], [{"zeta": 0.2002}, {"zeta": 0.1998}]]):
+        difference = (told(blow(**near)) - told(blow(**far))) / (0.1, 4e-4)[i]
+        assert_allclose([each[i] for each in slopes], difference, rtol=3e-6)
+
+
 def test_body_numbers_are_those_of_a_rebuilt_body():
     numbers = {"section.thickness": 3e-3, "material.E": 70e9, "material.rho": 2700.0, "target.scale": 1.0}
 
