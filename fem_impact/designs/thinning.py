@@ -73,10 +73,11 @@ class Solved(check.Brief):
         """
         section, points = self.system.section, self.system.mesh.points
         less = thinned_section(section, lambda at: np.full(len(at), depth))
-        stiff, heavy = (
-            float((getattr(less, name)(points) / getattr(section, name)(points)).reshape(len(points), -1)[:, 0].min())
+        each = (
+            [getattr(one, name)(points).reshape(len(points), -1)[:, 0] for one in (less, section)]
             for name in ("stiffness", "rotary" if self.modes.thick else "inertia")
         )
+        stiff, heavy = (float((left / whole).min()) for left, whole in each)
         return stiff**0.5, heavy**-0.5
 
     @cached_property

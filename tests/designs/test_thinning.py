@@ -53,6 +53,11 @@ def test_frequencies_stay_within_reach_whatever_is_taken_off(round_bar):
         assert (low < ratio).all() and (ratio < high).all()
 
 
+def test_reach_of_a_plate_is_told_though_parts_of_its_stiffness_are_zero():
+    plate = fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.1), fi.Plate(WOOD, 4e-3))
+    assert_allclose(body_of(plate, {1: None}).first().reach(1e-3), [0.75**1.5, 0.75**-0.5], rtol=1e-12)
+
+
 def test_a_search_that_gains_next_to_nothing_ends():
     """A sixth of the bodies did not gain a hundredth of what was missed; there were 74."""
     with pytest.warns(fi.ToleranceWarning, match="mode 1 stays .*; allow more depth or patches"):
