@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -146,12 +147,11 @@ def _pairs(
     flexibility = Flexibility.of(system)
     n_rigid, rate = system.rigid.shape[1], system.frame.rate
     limit = None if max_frequency is None else (2.0 * np.pi * max_frequency / rate) ** 2
-    inert = shallow.whole_mass(system) if system.ribbed else None  # else what moves in the plane is left out
-    mass: Any = system.M if inert is None else inert
+    mass = shallow.whole_mass(system)
     if n_modes is None:
         assert limit is not None
         # of ribbed plates, as a drift spares some of their mass, there are no more below
-        n_modes = count_below(system.K, system.M if inert is None else inert.whole, limit)
+        n_modes = count_below(system.K, mass.whole, limit)
         if n_modes == 0:
             raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
     if n_modes <= n_rigid:
@@ -161,7 +161,7 @@ def _pairs(
         if system.mesh.dimension == 1 and n > FIRST_SLICE:
             values, vectors = by_slices(flexibility, n)
         else:
-            values, vectors = _complete_eigenpairs(system, flexibility, inert, n, limit)
+            values, vectors = _complete_eigenpairs(system, flexibility, mass, n, limit)
         if system.strain is not None:  # more accurate than K if there are tiny triangles
             values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, mass @ vectors)
             order = np.argsort(values, kind="stable")
@@ -248,16 +248,16 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
 
 
 def _complete_eigenpairs(
-    system: System, flexibility: Flexibility, inert: shallow.PlaneMass | None, n: int, limit: float | None
+    system: System, flexibility: Flexibility, mass: shallow.PlaneMass, n: int, limit: float | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the n lowest flexible eigenpairs without missing any, of a ribbed plate with all its mass.
+    """Find the n lowest flexible eigenpairs, with a ``mass`` as of `shallow.whole_mass`, without missing any.
 
     If a limit is given, n is the number of modes below it. Otherwise inertia confirms the number below a gap after the
     last mode. In a dense cluster the first search may miss some modes; it is then repeated for more modes, with a
     stricter residual, twice at most.
     """
     n_rigid = flexibility.rigid.shape[1]
-    moving = len(flexibility.inertial) if inert is None else system.n_dofs
+    moving = np.count_nonzero(mass.whole.diagonal())
     available = moving - n_rigid
     if n > available:
         size = size_for(system, n + n_rigid, None, None)
@@ -269,12 +269,9 @@ def _complete_eigenpairs(
             f"for {n + n_rigid} modes; {advice}"
         )
     more = min(n + (BLOCK if limit is None else 0), available)
-    mass, spared = (system.M, 0) if inert is None else (inert.whole, inert.spared.shape[1])
+    find = partial(_lowest_of_ribbed, flexibility, mass) if system.ribbed else partial(lowest, flexibility)
     for allowed in (RESIDUAL, STRICT, STRICT):
-        if inert is None:
-            values, vectors = lowest(flexibility, more, allowed)
-        else:
-            values, vectors = _lowest_of_ribbed(flexibility, inert, more, allowed)
+        values, vectors = find(more, allowed)
         if more == available:
             return values[:n], vectors[:, :n]
         if limit is not None:
@@ -282,8 +279,9 @@ def _complete_eigenpairs(
         else:
             gaps = np.diff(values[n - 1 :]) / values[n - 1 : -1]
             at = n - 1 + int(gaps.argmax())
-            below, found = count_below(system.K, mass, 0.5 * (values[at] + values[at + 1])) - n_rigid, at + 1
-        if below - spared <= found <= below:  # with all its mass each drift lowers a mode, by less than to the next
+            below, found = count_below(system.K, mass.whole, 0.5 * (values[at] + values[at + 1])) - n_rigid, at + 1
+        # the count has the mass that drifts spare, too, and each of them may add one
+        if below - mass.spared.shape[1] <= found <= below:
             return values[:n], vectors[:, :n]
         more = min(max(below, more) + 4 * BLOCK, available)
     raise check.SimulationError(
@@ -294,22 +292,22 @@ def _complete_eigenpairs(
 
 @one_thread
 def _lowest_of_ribbed(
-    flexibility: Flexibility, inert: shallow.PlaneMass, n: int, residual: float
+    flexibility: Flexibility, mass: shallow.PlaneMass, n: int, residual: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """`lowest` of a ribbed plate, whose plane has mass and modes of its own; the inverse problem keeps the lowest."""
-    pulled = inert @ flexibility.sprung
-    sprung, pulled = np.linalg.solve(
-        np.linalg.cholesky(flexibility.sprung.T @ pulled), [flexibility.sprung.T, pulled.T]
-    )
+    # (n_sprung, n_dofs) orthonormal in all the mass: in that of the deflection they would mix with modes not found
+    pulled = mass @ flexibility.sprung
+    square = np.linalg.cholesky(flexibility.sprung.T @ pulled)
+    sprung, pulled = np.linalg.solve(square, [flexibility.sprung.T, pulled.T])
 
     def unsprung(loads: np.ndarray) -> np.ndarray:
         found = flexibility.solve(loads - pulled.T @ (sprung @ loads))
         return found - sprung.T @ (pulled @ found)
 
     available = flexibility.K.shape[0] - flexibility.rigid.shape[1] - len(sprung)
-    bent = krylov(unsprung, inert, min(n, available), available, residual)
-    basis = np.column_stack([flexibility.solve(pulled.T), bent])
-    energy, kinetic = flexibility.products(basis), basis.T @ (inert @ basis)
+    bent = krylov(unsprung, mass, min(n, available), available, residual)
+    basis = np.column_stack([flexibility.solve(pulled.T), bent])  # what the springs bend comes with their motions
+    energy, kinetic = flexibility.products(basis), basis.T @ (mass @ basis)
     unit = np.diag(energy) ** -0.5
     slowness, turn = eigh(0.5 * (kinetic + kinetic.T) * np.outer(unit, unit), energy * np.outer(unit, unit))
     slowness, turn = slowness[: -n - 1 : -1], turn[:, : -n - 1 : -1]

@@ -203,7 +203,9 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
 
 
 def whole_mass(system: Any) -> PlaneMass:
-    """All the mass of a ribbed plate."""
+    """All the mass that counts: of a ribbed plate with that in its plane, of any other body that of the deflection."""
+    if not system.ribbed:
+        return PlaneMass(system.M, np.zeros((system.n_dofs, 0)))
     found = mass_in_plane(system)
     return PlaneMass(found.whole + system.M, found.spared)
 

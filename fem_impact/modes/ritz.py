@@ -28,7 +28,7 @@ from .._base.threads import one_thread
 from ..fe import plausible, point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise
-from ..fe.shallow import PlaneMass, whole_mass
+from ..fe.shallow import whole_mass
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
 
@@ -93,7 +93,7 @@ class Krylov:
         self.system = system
         self.shift = (shift / system.frame.rate) ** 2  # s**2 in the frame
         self._moving = system.M @ system.rigid
-        self._mass = whole_mass(system) if system.ribbed else PlaneMass(system.M, np.zeros((system.n_dofs, 0)))
+        self._mass = whole_mass(system)
         self._eased, self._pushed = self._mass.spared, system.rigid
         self._factors = factorise(system.K + self.shift * self._mass.whole)
         if system.ribbed:
