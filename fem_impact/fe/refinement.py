@@ -25,6 +25,7 @@ from .material import stiffness_by_way
 from .section import Plate
 from .supports import support_of_facets
 from .system import System
+from .theory import Theory
 
 COARSER = 1.5  # [-] ratio of element sizes whose frequencies are compared: less than half the unknowns
 # [-] the same ratio where triangles are halved, at the blow and where a plate is curved: one halving more
@@ -260,7 +261,7 @@ def _complete_eigenpairs(
     moving = np.count_nonzero(mass.whole.diagonal())
     available = moving - n_rigid
     if n > available:
-        size = size_for(system, n + n_rigid, None, None)
+        size = size_for(system, n + n_rigid, None)
         advice = f"elements of {size:.1g} m suffice"
         if len(system.mesh.cells) * (system.mesh.size / size) ** system.mesh.dimension > MOST_CELLS:
             advice = "no mesh allowed has enough"
@@ -314,15 +315,13 @@ def _lowest_of_ribbed(
     return 1.0 / slowness, (basis * unit) @ (turn / np.sqrt(slowness))
 
 
-def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:
-    """The system on a mesh that resolves the shortest wave wanted; unchanged if the user chose the mesh size.
+def fine_enough(system: System, size: float, coarser: bool = False) -> System:
+    """The system on a mesh of elements of a size [m]; unchanged if the user chose that size, or if it is finer already.
 
-    For a tolerance it is the mesh expected to meet it if edges and corners need no finer one: a mesh file much finer
-    than needed gives way to a coarser mesh, too.
+    If ``coarser`` meshes serve, too, a mesh file much finer than needed gives way to one.
     """
-    mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
-    finer = size < mesh.size
-    coarser = tolerance is not None and size > mesh.size and len(mesh.cells) > CHEAP_CELLS
+    mesh, finer = system.mesh, size < system.mesh.size
+    coarser = coarser and size > mesh.size and len(mesh.cells) > CHEAP_CELLS
     if mesh.size_stated or not (finer or coarser):
         return system
     other = mesh.refined(mesh.size / size)
@@ -331,24 +330,32 @@ def fine_enough(system: System, n_modes: int | None, max_frequency: float | None
     return reassemble(system, other) if (more > 0 if finer else more < 0) else system
 
 
-def resolves(system: System, max_frequency: float) -> bool:
-    """Whether the mesh is fine enough for waves up to a frequency [Hz]."""
-    return system.mesh.size <= system.rules.wave / _wave(system, None, max_frequency)
-
-
-def size_for(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> float:
-    """Size [m] of elements that resolve the shortest wave wanted."""
+def size_for(system: System, n_modes: int | None, max_frequency: float | None, side: float | None = None) -> float:
+    """Size [m] of elements that resolve the shortest wave wanted; ``side`` [rad] is it times the wavenumber."""
     wave = _wave(system, n_modes, max_frequency)
-    size = system.rules.wave / wave
-    if system.rules.graded and tolerance is not None:  # the highest frequency of a smooth plate errs by so much
-        factor, bend = ERROR_OF_WAVE
-        excess = lambda log: np.log(factor / tolerance) + 8.0 * log - np.log1p((np.exp(log) / bend) ** 3)  # noqa: E731
-        size = float(np.exp(brentq(excess, -10.0, 10.0))) / wave
-    elif system.rules.graded:  # a few modes cost little, so find them more accurately
+    size = (side or system.rules.wave) / wave
+    if system.rules.graded and side is None:  # a few modes cost little, so find them more accurately
         size = min(size, max(affordable_size(system.mesh), 1.1 / wave))  # errors of 2e-7, clamped 1e-5
     if isinstance(system.section, Plate) and system.section.tension:
         size = min(size, layer_size(system.frame.stiffness, system.section.tension, system.frame.length))
     return size
+
+
+def side_for(rules: Theory, tolerance: float) -> float:
+    """Size of elements times the wavenumber [rad] at which frequencies err by a tolerance, or by less."""
+    if not rules.graded:
+        return rules.wave
+    factor, bend = ERROR_OF_WAVE
+    excess = lambda log: np.log(factor / tolerance) + 8.0 * log - np.log1p((np.exp(log) / bend) ** 3)  # noqa: E731
+    return float(np.exp(brentq(excess, -10.0, 10.0)))
+
+
+def longest_side(rules: Theory, tolerance: float) -> float:
+    """The same [rad] for modes that follow the first ones; these meet the tolerance, however small it is.
+
+    Errors that need a second mesh are stated several times too large where the coarser hardly resolves the waves.
+    """
+    return max(rules.wave, side_for(rules, 0.2 * tolerance if rules.compared else tolerance))
 
 
 def affordable_size(mesh: Mesh) -> float:
@@ -382,7 +389,8 @@ def refine(
         raise ValueError(
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
-    first = fine_enough(system, n_modes, max_frequency, tolerance)
+    side = side_for(system.rules, tolerance)
+    first = fine_enough(system, size_for(system, n_modes, max_frequency, side), coarser=True)
     found, size = solve_on_mesh(first, n_modes, max_frequency), np.inf
     tried: list[tuple[float, float]] = []  # size and error of each mesh
     bent = found.system.rules.compared and not found.system.rules.thick

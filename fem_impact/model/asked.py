@@ -190,8 +190,13 @@ class Asked:
 
     def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
         """Modes of the target, see `Target.find`."""
-        size, limit = self.pieces.get("size"), 2.0 * self.budget.cheap / self.budget.fineness
-        return self.blow.target.find(n_modes, max_frequency, tolerance=limit, size=size, **how)
+        size = self.pieces.get("size")
+        return self.blow.target.find(n_modes, max_frequency, tolerance=self.close, size=size, **how)
+
+    @property
+    def close(self) -> float:
+        """What frequencies may err [-]."""
+        return 2.0 * self.budget.cheap / self.budget.fineness
 
     def striker_modes(self, margin: float) -> tuple[int, float]:
         """Number of kept striker modes, and the error [-] of leaving out the others."""

@@ -27,7 +27,6 @@ SHORT_WAVES = {
     "argyris": 1e-5, "argyris and quartic": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
 PER_MODE = 40.0  # [-] unknowns of thin flat plates for each mode of many, at 1.8 rad per triangle; measured, 38 to 42
-LEAST = 2900.0  # [-] and as many for few modes, at CHEAP_CELLS; measured, 2700
 CROWDED = 1000.0  # [-] squared perimeter over area of a strip 250 times as long as wide
 
 
@@ -137,10 +136,10 @@ def _with_mesh(asked: Asked, forecast: Forecast, shapes: FieldShapes, limit: flo
     """The forecast with a mesh that resolves a frequency [Hz] of the body as assembled."""
     first, system, mesh = forecast.first, shapes.system, shapes.system.mesh
     assert first is not None and first.frequency_error is not None
-    stated = asked.meshed or refinement.resolves(system, limit)
-    size = mesh.size if stated else min(mesh.size, refinement.size_for(system, None, limit, None))
+    side = refinement.longest_side(system.rules, asked.close)
+    size = mesh.size if asked.meshed else min(mesh.size, refinement.size_for(system, None, limit, side))
     n_dofs = round(refinement.unknowns(system.element, mesh, size))
-    error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
+    error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element] * (side / system.rules.wave) ** 8)
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
     work = cost.NOTHING  # if the plan has found all modes, and their compliance
     if forecast.n_modes > first.n_modes:
@@ -163,10 +162,11 @@ def _solved(rules: Theory, n_dofs: float, n_modes: int) -> list[cost.Work]:
     return [cost.by_modes(n, n_modes) for n in [n_dofs, *coarser]]
 
 
-def ringing_work(element: str, n_modes: int) -> cost.Work:
-    """So many modes of a plate for motion and sound, on a mesh as `refinement.size_for` makes it for them."""
+def ringing_work(element: str, n_modes: int, tolerance: float) -> cost.Work:
+    """So many modes of a plate for motion and sound, on a mesh as `Target.find` makes it for them."""
     rules = BY_ELEMENT[element]
-    n_dofs = max(LEAST, PER_MODE * n_modes) * rules.unknowns / BY_ELEMENT["argyris"].unknowns
+    each = PER_MODE * (rules.wave / refinement.longest_side(rules, tolerance)) ** 2
+    n_dofs = each * n_modes * rules.unknowns / BY_ELEMENT["argyris"].unknowns
     return sum(_solved(rules, n_dofs, n_modes), cost.NOTHING)
 
 

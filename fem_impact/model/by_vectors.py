@@ -90,7 +90,8 @@ class Vectors(Description):
             grown, finest = rattling, max(*unknowns, RESOLVING * rattling)
             unknowns = [finest, max(unknowns[0], round(finest / refinement.COARSER**2))]
         work = cost.by_vectors(unknowns, grown)
-        ringing = sum((ringing_work(target.element, n) for n in (FIRST_LOOK, ringing_count(asked))), cost.NOTHING)
+        of_modes = FIRST_LOOK, ringing_count(asked)
+        ringing = sum((ringing_work(target.element, n, asked.close) for n in of_modes), cost.NOTHING)
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
         reason = f"{target.element} elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"

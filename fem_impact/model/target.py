@@ -347,25 +347,24 @@ class Target:
         stages: Stages | None, keep: Any,
     ) -> Modes:  # fmt: skip
         """What `find` finds of a body whose modes are not known."""
-        max_frequency = reach.get("max_frequency")
-        insisted, wanted = size is not None or self.size_stated, None
+        wanted = reach.get("n_modes"), reach.get("max_frequency")
+        insisted, allowed = size is not None or self.size_stated, min(tolerance, refinement.LOOSEST)
         if self.kind == "analytic" and (size is None or self.source == "analytic"):
-            body = None
-        elif first is None:
-            body = self.assembled(stages or Stages(), size)
-            wanted = None if insisted else min(tolerance, refinement.LOOSEST)
-        else:  # start from the mesh of the first modes and refine it if it cannot resolve the shortest wave
-            assert isinstance(first.shapes, FieldShapes)
-            body = first.shapes.system
-            enough = insisted or (max_frequency is not None and refinement.resolves(body, max_frequency))
-            body = replace(body, mesh=replace(body.mesh, size_stated=enough))
-        with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
-            if body is None:
-                assert self.closed is not None
+            assert self.closed is not None
+            with np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
                 return self.closed(**reach)
-            if wanted is None:
-                return finding.find_modes(body, **reach, keep=keep)
-            return finding.modes_of(refinement.refine(body, reach.get("n_modes"), max_frequency, wanted, of_mesh=True))
+        body = None if first is not None else self.assembled(stages or Stages(), size)
+        with self.blame("mesh"), np.errstate(all="ignore"):
+            if body is None:  # start from the mesh of the first modes and refine it where waves are too short
+                assert first is not None and isinstance(first.shapes, FieldShapes)
+                system = first.shapes.system
+                body = replace(system, mesh=replace(system.mesh, size_stated=insisted))
+                side = refinement.longest_side(body.rules, allowed)
+                body = refinement.fine_enough(body, refinement.size_for(body, *wanted, side))
+                body = replace(body, mesh=replace(body.mesh, size_stated=True))
+            elif not insisted:
+                return finding.modes_of(refinement.refine(body, *wanted, allowed, of_mesh=True))
+            return finding.find_modes(body, **reach, keep=keep)
 
     def number_below(self, modes: Modes, limit: float) -> float:
         """About how many modes there are below a frequency [Hz], by Weyl's law from the first ones, all as struck.

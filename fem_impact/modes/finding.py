@@ -77,7 +77,7 @@ def find_modes(
             system, n_modes, max_frequency, check.between("tolerance", tolerance, 1e-10, refinement.LOOSEST)
         )
     else:
-        fine = refinement.fine_enough(system, n_modes, max_frequency, None)
+        fine = refinement.fine_enough(system, refinement.size_for(system, n_modes, max_frequency))
         found = refinement.solve_or_read(fine, n_modes, max_frequency, keep)
     return modes_of(found, damping_ratio, bounds)
 

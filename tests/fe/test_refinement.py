@@ -33,7 +33,7 @@ def test_the_wave_of_a_frequency_is_that_of_bending_waves():
 def test_elements_of_the_size_for_a_tolerance_meet_it_on_a_smooth_plate(tolerance):
     """The hinged rectangle, exact; its elements are not a hundred times finer than needed either."""
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
-    size = refinement.size_for(system, 30, None, tolerance)
+    size = refinement.size_for(system, 30, None, refinement.side_for(system.rules, tolerance))
     fine = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=size), PLATE, {"boundary": "hinged"})
     found = refinement.solve_on_mesh(fine, 30, None)
     exact = 2.0 * np.pi * fi.analytic.rectangle(0.5, 0.3, section=PLATE, n_modes=30).frequencies
@@ -77,13 +77,10 @@ def test_a_frequency_limit_counts_by_inertia_and_below_the_first_mode_is_told():
         refinement.solve_on_mesh(system, None, 0.9 * first)
 
 
-def test_resolved_frequencies_grow_with_the_square_of_the_mesh():
-    def highest(size):
-        system = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=size), PLATE, {"boundary": "hinged"})
-        limit = np.geomspace(1.0, 1e6, 400)
-        return limit[[refinement.resolves(system, f) for f in limit]].max()
-
-    assert_allclose(highest(0.025) / highest(0.05), 4.0, rtol=0.08)  # the frequencies tried are 3.5 % apart
+def test_elements_for_a_frequency_shrink_with_its_root():
+    system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
+    sizes = [refinement.size_for(system, None, frequency, 1.8) for frequency in (1e3, 4e3)]
+    assert_allclose(sizes[0] / sizes[1], 2.0, rtol=1e-12)
 
 
 def test_a_kept_spectrum_is_read_and_a_damaged_or_foreign_one_replaced(tmp_path, monkeypatch):
@@ -151,7 +148,8 @@ def test_the_number_of_unknowns_is_foretold(theory):
 def test_some_modes_are_found_to_a_few_millionths_if_nothing_is_asked(n_modes):
     """Elements are finer than the wave of the last mode asks, as few of them cost little."""
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
-    found = refinement.solve_on_mesh(refinement.fine_enough(system, n_modes, None, None), n_modes, None)
+    fine = refinement.fine_enough(system, refinement.size_for(system, n_modes, None))
+    found = refinement.solve_on_mesh(fine, n_modes, None)
     exact = 2.0 * np.pi * fi.analytic.rectangle(0.5, 0.3, section=PLATE, n_modes=n_modes).frequencies
     assert np.abs(found.omega / exact - 1.0).max() < 4e-6  # 2e-7 and 2.3e-6 were measured
 
@@ -160,7 +158,7 @@ def test_the_edge_layer_of_a_stretched_plate_is_resolved():
     """A clamped disk under so much tension that its edge bends over a hundredth of its radius."""
     plate = fi.Plate(PLATE.material, thickness=5e-4, tension=2e4)
     system = fi.assemble(fi.mesh.disk(0.3), plate, {"boundary": "clamped"})
-    chosen = system.mesh.size / refinement.size_for(system, 4, None, None)
+    chosen = system.mesh.size / refinement.size_for(system, 4, None)
     coarse, fine = (
         refinement.solve_on_mesh(refinement.reassemble(system, system.mesh.refined(factor)), 4, None).omega
         for factor in (chosen, 1.7 * chosen)
