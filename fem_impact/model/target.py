@@ -351,7 +351,7 @@ class Target:
         insisted, allowed = size is not None or self.size_stated, min(tolerance, refinement.LOOSEST)
         if self.kind == "analytic" and (size is None or self.source == "analytic"):
             assert self.closed is not None
-            with np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
+            with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
                 return self.closed(**reach)
         body = None if first is not None else self.assembled(stages or Stages(), size)
         with self.blame("mesh"), np.errstate(all="ignore"):

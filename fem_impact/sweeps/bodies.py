@@ -160,8 +160,8 @@ def by_vectors(
 def of_hammers(
     target: Target, at: Any, ends: Sequence[Mapping[str, float]], chance: Sequence[Mapping[str, float]],
     tolerance: float, n_modes: int, stages: Stages,
-) -> tuple[list[Modes], bool]:  # fmt: skip
-    """The body as blows of rigid hammers with linear tips at each point need it, and whether that is by Ritz vectors.
+) -> list[Modes]:  # fmt: skip
+    """The body as blows of rigid hammers with linear tips at each point need it.
 
     ``ends`` and ``chance`` as in `Sized`, of "mass" and "stiffness"; only whether a second impact follows matters.
     """
@@ -171,7 +171,7 @@ def of_hammers(
         case = Case(shape, Striker.rigid(ends[0]["mass"]), Contact.linear(1.0), points[0], 1.0)
         views = Sized(target, case, ends, chance, tolerance, max_impacts=2).views(points, stages)
         if views is not None:
-            return [views[tuple(point.tolist())] for point in points], True
+            return [views[tuple(point.tolist())] for point in points]
     modes = target.modes
     if modes is None:
         with stages("modes"):
@@ -181,7 +181,7 @@ def of_hammers(
                 needed = max(needed_frequency(case.with_values(values), tolerance) for values in chance)
                 n_modes = min(n_modes, max(FIRST_LOOK, math.ceil(accuracy.number_of_modes(first, needed))))
             modes = target.find(n_modes, tolerance=tolerance, stages=stages)
-    return [target.surrounded(modes)] * len(np.atleast_2d(at)), False
+    return [target.surrounded(modes)] * len(np.atleast_2d(at))
 
 
 @dataclass(frozen=True, eq=False)

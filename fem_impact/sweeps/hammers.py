@@ -205,12 +205,12 @@ def choose_on(
         return [{"mass": mass, "stiffness": tip} for mass, tip in pairs]
 
     ends, chance = blows(hardest, SOFTEST**0.5 * centre), blows(centre)
-    (modes, *_), by_vectors = bodies.of_hammers(target, at, ends, chance, TOLERANCE, MOST_MODES, stages or Stages())
+    modes, *_ = bodies.of_hammers(target, at, ends, chance, TOLERANCE, MOST_MODES, stages or Stages())
     flexible = modes.frequencies[modes.omega > 0.0]
     lowest = float(flexible[0]) if len(flexible) else centre
 
     def hammer(mass: float, border: bool = False) -> Hammer:
-        limit = float(accuracy.resonant_stiffness(mass, hardest)) if by_vectors else None
+        limit = float(accuracy.resonant_stiffness(mass, hardest)) if target.kind == "fe" else np.inf
         return replace(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest), limit), border=border)
 
     found: dict[int, Hammer] = {}
@@ -247,12 +247,12 @@ def _with_borders(chosen: tuple[Hammer, ...], hammer: Callable[[float, bool], Ha
 
 
 def _hammer(
-    modes: Modes, at: Any, mass: float, bandwidth: float, drop: float, tuned: tuple[float, float], limit: float | None
+    modes: Modes, at: Any, mass: float, bandwidth: float, drop: float, tuned: tuple[float, float], limit: float
 ) -> Hammer:
     """What one hammer can do.
 
-    ``tuned`` are frequencies [Hz] far above those of the contact with the softest tip; ``limit`` is the hardest tip
-    [N/m], or None for the hardest that the modes resolve.
+    ``tuned`` are frequencies [Hz] far above those of the contact with the softest tip; no tip is harder than ``limit``
+    [N/m], nor than modes resolve, unless these are vectors.
     """
     striker, alone = Striker.rigid(mass), replace(modes, poorer={})
 
@@ -277,12 +277,10 @@ def _hammer(
         return bool(size.min() >= size[0] * 10.0 ** (-drop / 20.0))
 
     low = SOFTEST * mass * (2.0 * np.pi * min(tuned)) ** 2
-    if limit is not None:
-        high = limit
-    elif modes.omega.any():
+    high = STIFFEST * mass * (2.0 * np.pi * max(tuned)) ** 2
+    if modes.omega.any() and not modes.poorer:
         high = _last_resolved(modes, at, mass)
-    else:
-        high = STIFFEST * mass * (2.0 * np.pi * max(tuned)) ** 2
+    high = min(high, limit)
     if high <= low:
         return Hammer(float(mass), (), (), high, None, None, modes.notes)
     tips = _series(low, high, 100)  # 2 % apart

@@ -227,7 +227,7 @@ class Spread(check.Brief):
             other = f", {self.checks.n_other} with another number of impacts" if self.checks.n_other else ""
             unknown = f" (not known: {', '.join(self.checks.unknown)})" if self.checks.unknown else ""
             lines.append(
-                f"{self.checks.n_blows} blows struck again one by one differ by at most {worst}{other}; "
+                f"{self.checks.n_blows} of the blows, struck again one by one, differ most by {worst}{other}; "
                 f"error of the body's description {self.checks.body:.1e}, of the model itself "
                 f"{self.checks.model:.1g}{unknown}"
             )

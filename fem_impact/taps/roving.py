@@ -243,7 +243,7 @@ def plan_on_body(
         )
     pairs, alike = np.unique(np.column_stack([masses, stiffnesses]), axis=0, return_inverse=True)
     blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in pairs]
-    views, _ = bodies.of_hammers(target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, Stages())
+    views = bodies.of_hammers(target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, Stages())
     if duration is None:  # lines at most 10 Hz apart, to part modes
         duration = sampling.ringing_time(modes, inside_band(modes, bandwidth), (0.1, triggers.LONGEST))
     n_times = round(check.positive("duration", duration, "s") * RATE * bandwidth)
