@@ -383,7 +383,8 @@ class Striker(check.Brief):
         if self.hand is not None:
             raise ValueError(f"striker must fall freely to {what}, a hand holds this one; leave gravity or hand out")
         if self.aslant or (self.modes.n_rigid == 1 and self.felt_mass < (1.0 - 1e-9) * self.mass):
-            raise ValueError(f"striker must fall freely to {what}, but this one turns or comes aslant; give its speed")
+            advice = "give its speed" if what == "be dropped" else "leave gravity out"
+            raise ValueError(f"striker must fall freely to {what}, but this one turns or comes aslant; {advice}")
 
     def let_go(self, what: str) -> None:
         """Raise ValueError if a hand or the weight brings the striker back, for ``what`` cannot follow it."""
