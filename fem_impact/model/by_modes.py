@@ -13,6 +13,7 @@ from ..impact import accuracy
 from ..impact.response import Response
 from ..modes.modal import Modes, at_rest
 from ..modes.shapes import FieldShapes
+from ..modes.stretching import stretch
 from . import cost, vectors
 from .asked import Asked, Description, Forecast, Unaffordable
 from .budget import NOTCH
@@ -80,6 +81,9 @@ class Modal(Description):
         if band > needed:
             kept += f" ({band:g} Hz requested, {needed:.4g} Hz needed for the blow)"
         if asked.values["stretching"]:
+            if modes.dimension == 1:  # the modes of a plate take long to stretch
+                with target.blame("strike"):
+                    stretch(modes)
             kept += "; it stiffens as it stretches"
         forecast = asked.foretell(
             "modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass, n_modes=number,

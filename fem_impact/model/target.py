@@ -369,7 +369,8 @@ class Target:
     def number_below(self, modes: Modes, limit: float) -> float:
         """About how many modes there are below a frequency [Hz], by Weyl's law from the first ones, all as struck.
 
-        The first modes of a strip crowd, or are those of a beam, and mislead: then the law itself counts the others.
+        What its edges add or take grows as the root of its own count; the first modes say how much. Those of a strip
+        crowd, or are those of a beam, and mislead: then the law itself counts the others.
         """
         section, low, number = self.section, float(modes.frequencies[-1]), float(modes.n_modes)
         if not low:  # a rigid body has no others
@@ -377,7 +378,7 @@ class Target:
         if self.mesh is None or not isinstance(section, Plate):
             return number * (limit / low) ** (0.5 * modes.dimension)
         near, far = (self.count_below(frequency / self.stretch) for frequency in (low, limit))
-        grown, law = number * (far / near if section.tension else limit / low), number + far - near
+        grown, law = max(0.0, far + (number - near) * (far / near) ** 0.5), number + far - near
         # the largest of its wavenumbers is twice the mean across strong grain
         return law if limit > low and not law / 3.0 <= grown <= 3.0 * law else grown
 
