@@ -207,7 +207,9 @@ class Target:
     def surrounded(self, modes: Modes) -> Modes:
         """The modes as struck: scaled, damped and in the air around."""
         modes = self.finished(modes)
-        modes = modes if self.air is None else in_air(modes, sides=AIR[self.air], baffled=self.baffle)
+        if self.air is not None:
+            with self.blame("target"):
+                modes = in_air(modes, sides=AIR[self.air], baffled=self.baffle)
         return replace(modes, stretches=True) if self.stretching else modes
 
     @cached_property

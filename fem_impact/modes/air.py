@@ -155,7 +155,7 @@ def _spacing(modes: Modes, area: float, speed: float) -> float:
         raise ValueError(
             f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
             f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than 1e+09 "
-            "numbers"
+            "numbers; leave air out, or take a larger tolerance or a smaller band"
         )
     return float(spacing)
 

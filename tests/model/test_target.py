@@ -241,3 +241,22 @@ def test_plans_refuse_beams_that_cannot_stretch():
     bar = fi.assemble(fi.mesh.line(0.4), fi.Beam.rectangular(ALUMINIUM, width=0.01, height=1e-3), held)
     with pytest.raises(ValueError, match="but an end is free; hold it, or leave stretching out"):
         fi.plan(bar, fi.Striker.rigid(1e-3), fi.Contact.linear(1e4), at=0.2, speed=1.0, stretching=True)
+
+
+def test_too_much_air_is_refused_by_the_file_with_advice(tmp_path):
+    text = """
+        mesh = { shape = "rectangle", length = 1.0, width = 1.0 }
+        supports = { boundary = "hinged" }
+        material = { E = 70e9, nu = 0.33, rho = 2700.0 }
+        section = { kind = "plate", thickness = 1e-2 }
+        target = { air = "one side" }
+        striker = { kind = "rigid", mass = 0.1 }
+        contact = { kind = "linear", stiffness = 1e5 }
+        strike = { at = [0.3, 0.3], speed = 1.0 }
+    """
+    path = tmp_path / "loud.toml"
+    path.write_text(text)
+    target = fi.load_scene(path).built.target
+    many = target.closed(n_modes=3000)
+    with pytest.raises(ValueError, match=r"loud\.toml: \[target\] speed of sound .*; leave air out"):
+        target.surrounded(many)
