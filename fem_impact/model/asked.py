@@ -191,7 +191,13 @@ class Asked:
     def find(self, n_modes: int, max_frequency: float | None = None, **how: Any) -> Modes:
         """Modes of the target, see `Target.find`."""
         size = self.pieces.get("size")
-        return self.blow.target.find(n_modes, max_frequency, tolerance=self.close, size=size, **how)
+        try:
+            return self.blow.target.find(n_modes, max_frequency, tolerance=self.close, size=size, **how)
+        except check.SimulationError as error:
+            raise check.SimulationError(
+                f"{self.blow.name}frequencies may err by {self.close / self.budget.total:.2g} times the tolerance of the "
+                f"blow, {self.budget.total:g}, which is {self.budget.total / self.close:.2g} times those here: {error}"
+            ) from None
 
     @property
     def close(self) -> float:

@@ -260,3 +260,14 @@ def test_too_much_air_is_refused_by_the_file_with_advice(tmp_path):
     many = target.closed(n_modes=3000)
     with pytest.raises(ValueError, match=r"loud\.toml: \[target\] speed of sound .*; leave air out"):
         target.surrounded(many)
+
+
+def test_frequencies_not_exact_enough_are_named_with_the_tolerance_of_the_blow(monkeypatch):
+    def fails(*_, **__):
+        raise fi.SimulationError("tolerance = 0.0002 is not met")
+
+    monkeypatch.setattr(Target, "find", fails)
+    bar = fi.assemble(fi.mesh.line(0.4), fi.Beam.rectangular(ALUMINIUM, width=0.01, height=1e-3), {"left": "clamped"})
+    said = "may err by 0.2 times the tolerance of the blow, 0.001, which is 5 times those here: tolerance ="
+    with pytest.raises(fi.SimulationError, match=said):
+        fi.plan(bar, fi.Striker.rigid(1e-3), SOFT, at=0.2, speed=1.0, tolerance=1e-3, target="modal")
