@@ -195,8 +195,8 @@ class Asked:
             return self.blow.target.find(n_modes, max_frequency, tolerance=self.close, size=size, **how)
         except check.SimulationError as error:
             raise check.SimulationError(
-                f"{self.blow.name}frequencies may err by {self.close / self.budget.total:.2g} times the tolerance of the "
-                f"blow, {self.budget.total:g}, which is {self.budget.total / self.close:.2g} times those here: {error}"
+                f"{self.blow.name}tolerance = {self.budget.total:g} of the blow is {self.budget.total / self.close:.2g} "
+                f"times that of its frequencies: {error}"
             ) from None
 
     @property

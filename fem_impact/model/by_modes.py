@@ -21,7 +21,7 @@ from .target import FIRST_LOOK, Stages
 
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
 # [-] a plate that needs more modes is taken as infinite above a frequency, if it overdamps the contact: a steel sheet
-# then keeps 4 100 modes instead of 15 190
+# of 0.3 mm then keeps 438 modes instead of 32 536
 MANY_MODES = 10_000
 # [-] frequency error of the shortest waves that the mesh resolves by `Theory.wave`; beams also round
 SHORT_WAVES = {

@@ -232,7 +232,7 @@ def disk(
     count, reach = asked.count(first, MOST_OF_DISK)
     if np.isfinite(reach):
         limit = np.sqrt(reach / root_area)
-        check_number(0.25 * limit**2 - limit, MOST_OF_DISK, radius=radius)  # Weyl, with an edge that takes most
+        check_number(0.25 * limit**2 - limit, MOST_OF_DISK, radius=radius)  # Weyl, and what a clamped edge takes
         z, n, weight = _roots(edge, ratio, max(5.0, limit))
         count = n_rigid + int(np.where(n == 0, 1, 2)[z <= limit].sum())  # two modes for any order but 0
     else:

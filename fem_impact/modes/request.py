@@ -89,7 +89,7 @@ def request(
 
 def check_number(about: float, most: int, **sizes: float) -> None:
     """Raise ValueError if a body of these sizes [m] has more than ``most`` modes below max_frequency."""
-    if about > 1.02 * most:  # a plan, which has the same limit, knows the number to a hundredth
+    if about > most:
         body = " and ".join(f"{name} {size:g} m" for name, size in sizes.items())
         raise ValueError(
             f"{body} must give at most {most} modes up to the frequency asked for, got about {about:.2g}; check the "
