@@ -60,7 +60,7 @@ def edited(text, key, value):
 @pytest.mark.parametrize(
     "text, key, huge, status, words",
     [
-        (QUICK, "stiffness", "9999999999999999999999999", 1, "take a larger tolerance, or a contact with stiffness"),
+        (QUICK, "stiffness", "9999999999999999999999999", 1, "take a larger tolerance, or a softer striker or contact"),
         (DISK, "angle", "18446744073709551616", 0, "turns; rad are expected"),
         (TIN, "loss", "9999999999999999999999999", 2, "[contact] loss must lie between 0 and 1e+12 s/m"),
     ],

@@ -194,8 +194,10 @@ class Asked:
         try:
             return self.blow.target.find(n_modes, max_frequency, tolerance=self.close, size=size, **how)
         except check.SimulationError as error:
+            if not str(error).startswith("tolerance"):
+                raise
             raise check.SimulationError(
-                f"{self.blow.name}tolerance = {self.budget.total:g} of the blow is {self.budget.total / self.close:.2g} "
+                f"tolerance = {self.budget.total:g} of the blow is {self.budget.total / self.close:.2g} "
                 f"times that of its frequencies: {error}"
             ) from None
 

@@ -150,7 +150,7 @@ def _by_elements(asked: Asked, frequency: float, stages: Stages) -> tuple[Elemen
     assert target.mesh is not None and asked.estimates is not None
     size = vectors.size_for(target, reach, tolerance)
     if size < refinement.smallest_size(target.element, target.mesh):
-        raise check.SimulationError(f"{asked.blow.name}{NO_MESH}")
+        raise check.SimulationError(NO_MESH)
     elements = vectors.elements_for(target, size, asked.mass, reach, tolerance)
     lasts = max(asked.duration, mixed.LASTING * asked.mass * asked.estimates.mobility)
     phase = 2.0 * np.pi * mixed.REACH * frequency * lasts

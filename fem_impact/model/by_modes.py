@@ -191,8 +191,7 @@ def _check_number(asked: Asked, dimension: int, limit: float, number: int, bande
         advice = f"give {name} of at most {float(f'{0.9 * lower * limit:.1e}'):g} Hz"
     else:
         soft = contact.stiffness * (0.5 * lower) ** (0.75 * (contact.exponent + 1.0))
-        advice = f"take a larger tolerance, or a contact with stiffness = {soft:.2g}"
+        advice = f"take a larger tolerance, or a softer striker or contact, with stiffness = {soft:.2g}"
     raise (check.SimulationError if banded else Unaffordable)(
-        f"{asked.blow.name}this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of "
-        f"{most}; {advice}"
+        f"this blow needs about {number:.2g} modes, up to {limit:.2g} Hz, more than the limit of {most}; {advice}"
     )

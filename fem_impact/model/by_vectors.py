@@ -58,7 +58,7 @@ class Vectors(Description):
         if band is not None and (rings := target.count_below(band / target.stretch)) > most:
             reach = 0.9 * band * most / rings
             raise check.SimulationError(
-                f"{blow.name}the sound up to {band:g} Hz needs about {rings:.2g} modes, more than the limit of {most}; "
+                f"the sound up to {band:g} Hz needs about {rings:.2g} modes, more than the limit of {most}; "
                 f"give a band of the quantity of at most {float(f'{reach:.1e}'):g} Hz"
             )
         with stages("modes"):
@@ -69,8 +69,9 @@ class Vectors(Description):
             soft = blow.contact.stiffness * (size / smallest) ** (2.0 * (blow.contact.exponent + 1.0))
             needs = refinement.unknowns(target.element, target.mesh, size)
             raise Unaffordable(
-                f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit "
-                f"of {refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
+                f"this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit of "
+                f"{refinement.MOST_UNKNOWNS}; take a softer striker or contact, with stiffness = "
+                f"{float(f'{0.9 * soft:.1e}'):g}"
             )
         wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
         elements = vectors.elements_for(target, size, asked.mass, *wanted)

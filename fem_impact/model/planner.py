@@ -189,7 +189,7 @@ def _planned(description: Description) -> Plan:
 def make_plan(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = Asked.checked(blow, changes)
-    with _note_slips(partial(slips_of, asked)):
+    with _note_slips(partial(slips_of, asked), blow.name):
         return _planned(choose(asked, stages))
 
 
@@ -201,14 +201,18 @@ def slips_of(asked: Asked) -> tuple[str, ...]:
 
 
 @contextmanager
-def _note_slips(find: Callable[[], tuple[str, ...]]) -> Iterator[None]:
-    """Put numbers that are probably a slip of a unit in front of an error, which is then hardly about anything else."""
+def _note_slips(find: Callable[[], tuple[str, ...]], name: str = "") -> Iterator[None]:
+    """Put numbers that are probably a slip of a unit in front of an error, which is then hardly about anything else.
+
+    The ``name`` of the file goes first.
+    """
     try:
         yield
     except check.SimulationError as error:
-        if not (slips := find()) or str(error).startswith(slips[0]):
-            raise
-        raise check.SimulationError(f"{'; '.join(slips)}: {error}") from None
+        slips, said = find(), str(error).removeprefix(name)
+        if slips and not said.startswith(slips[0]):
+            said = f"{'; '.join(slips)}: {said}"
+        raise check.SimulationError(f"{name}{said}") from None
 
 
 def choose(asked: Asked, stages: Stages) -> Description:
@@ -237,7 +241,7 @@ def choose(asked: Asked, stages: Stages) -> Description:
 @one_thread
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
-    with _note_slips(partial(slips_of, plan.description.asked)):
+    with _note_slips(partial(slips_of, plan.description.asked), plan.blow.name):
         run = strike_as_planned(plan, stages, keep)
     chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
     added: tuple[str, ...] = ()
@@ -264,7 +268,7 @@ def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
         if plan.blow.target.thick:
             advice += ", or the thin theory, which estimates what shear changes of the blow (`thin target`)"
         raise check.SimulationError(
-            f"{plan.blow.name}this blow needs about {plan.memory / 1e9:.2g} GB of memory for {plan.n_modes} modes or "
+            f"this blow needs about {plan.memory / 1e9:.2g} GB of memory for {plan.n_modes} modes or "
             f"vectors of {plan.n_dofs} unknowns, more than the {here / 1e9:.2g} GB of this machine; {advice}"
         )
     last, response, run = refine(plan.description, _strike, stages, keep)

@@ -253,8 +253,18 @@ def test_a_slip_of_a_unit_is_told_before_what_follows_from_it():
         assert told.splitlines()[1].startswith("Note: thickness 3 m is 10 times the shortest side")
 
 
+def test_whatever_a_plan_cannot_do_names_the_file(monkeypatch):
+    def fails(*_):
+        raise check.SimulationError("the mesher could not fill the outline")
+
+    monkeypatch.setattr(planner, "choose", fails)
+    with pytest.raises(check.SimulationError, match=r"^\S+/drumstick_map\.toml: the mesher could not"):
+        fi.plan(SHIPPED / "drumstick_map.toml")
+
+
 @pytest.mark.parametrize(
-    ("target", "words"), [(None, "take a contact with stiffness ="), ("mixed", "its modes has too many unknowns")]
+    ("target", "words"),
+    [(None, "take a softer striker or contact, with stiffness ="), ("mixed", "its modes has too many unknowns")],
 )
 def test_a_mesh_too_fine_for_the_echoes_is_known_before_the_blow(target, words):
     glass = fi.Material(70e9, 0.22, 2500.0)
