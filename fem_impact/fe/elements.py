@@ -185,17 +185,19 @@ class Triangles:
         cells = np.broadcast_to(cells, (len(points), cells.shape[1]))
         offset = points[:, None] - self.origin[cells]
         local = np.einsum("nkij,nkj->nki", self.inverse[cells], offset) + 1.0 / 3.0
-        straight = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
-        bent = self.curved[cells] & (straight > -0.5)  # facets bulge by less: an eighth of their turn, below 0.1
-        if self.bent is not None and bent.any():
-            which, away = cells[bent], offset[bent]
-            place = local[bent]
+        depth = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
+        near = self.curved[cells] & (depth > -0.5)  # facets bulge by less: an eighth of their turn, below 0.1
+        first = depth == depth.max(axis=1, keepdims=True)
+        for turn in (first, ~first):  # others hold no point that lies well inside the first
+            bent = near & turn & (first | (depth.max(axis=1, keepdims=True) < 1e-3))
+            if self.bent is None or not bent.any():
+                continue
+            which, away, place = cells[bent], offset[bent], local[bent]
             for _ in range(CURVE_STEPS):
                 moved = self.bent.shift(which, area_coordinates(place)[:, None])[0][:, 0]
                 place = np.einsum("nij,nj->ni", self.inverse[which], away - moved) + 1.0 / 3.0
                 place = np.clip(place, -1.0, 2.0)  # points far away are outside anyway
-            local[bent] = place
-        depth = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
+            depth[bent] = np.minimum(place.min(axis=1), 1.0 - place.sum(axis=1))
         best = depth.argmax(axis=1)
         row = np.arange(len(points))
         return cells[row, best], depth[row, best]

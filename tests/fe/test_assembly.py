@@ -8,6 +8,7 @@ from scipy.sparse.linalg import splu
 
 import fem_impact as fi
 from fem_impact.fe import assembly
+from fem_impact.mesh.facets import CURVE_STEPS
 
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 PLATE = fi.Plate(STEEL, 2e-3)
@@ -109,3 +110,12 @@ def test_points_beside_a_body_are_sought_together(monkeypatch):
     near, far = (np.array([deepest(x[None], each[None])[1][0] for x, each in zip(where, cells)])
                  for cells in (space.locate(where)[0][:, None], np.broadcast_to(every, (200, len(every)))))  # fmt: skip
     assert (near == far).all()
+
+
+def test_points_well_inside_a_triangle_bend_no_other(monkeypatch):
+    space, bent = fi.assemble(fi.mesh.disk(0.2), PLATE, {}).space, []
+    shift = space.bent.shift
+    monkeypatch.setattr(space.bent, "shift", lambda cells, area: bent.extend(cells) or shift(cells, area))
+    cells, inside = space.locate(space.origin)
+    assert inside.all() and (cells == np.arange(len(cells))).all() and set(bent) == set(np.flatnonzero(space.curved))
+    assert len(bent) == CURVE_STEPS * space.curved.sum()
