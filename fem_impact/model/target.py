@@ -355,18 +355,22 @@ class Target:
             assert self.closed is not None
             with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
                 return self.closed(**reach)
-        body = None if first is not None else self.assembled(stages or Stages(), size)
+        shapes = None if first is None else first.shapes
+        body = self.assembled(stages or Stages(), size) if shapes is None else None
         with self.blame("mesh"), np.errstate(all="ignore"):
-            if body is None:  # start from the mesh of the first modes and refine it where waves are too short
-                assert first is not None and isinstance(first.shapes, FieldShapes)
-                system = first.shapes.system
-                body = replace(system, mesh=replace(system.mesh, size_stated=insisted))
-                side = refinement.longest_side(body.rules, allowed)
-                body = refinement.fine_enough(body, refinement.size_for(body, *wanted, side))
-                body = replace(body, mesh=replace(body.mesh, size_stated=True))
-            elif not insisted:
-                return finding.modes_of(refinement.refine(body, *wanted, allowed, of_mesh=True))
-            return finding.find_modes(body, **reach, keep=keep)
+            if body is not None:
+                if not insisted:
+                    return finding.modes_of(refinement.refine(body, *wanted, allowed, of_mesh=True))
+                return finding.find_modes(body, **reach, keep=keep)
+            # start from the mesh of the first modes and refine it where waves are too short
+            assert isinstance(shapes, FieldShapes)
+            body = replace(shapes.system, mesh=replace(shapes.system.mesh, size_stated=insisted))
+            side = refinement.longest_side(body.rules, allowed)
+            body = refinement.fine_enough(body, refinement.size_for(body, *wanted, side))
+            body = replace(body, mesh=replace(body.mesh, size_stated=True))
+            modes = finding.find_modes(body, **reach, keep=keep)
+            assert isinstance(modes.shapes, FieldShapes)
+            return replace(modes, shapes=modes.shapes.after(shapes))
 
     def number_below(self, modes: Modes, limit: float) -> float:
         """About how many modes there are below a frequency [Hz], by Weyl's law from the first ones, all as struck.

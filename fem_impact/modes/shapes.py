@@ -333,3 +333,7 @@ class FieldShapes(ElementShapes, check.Locked):
 
     def take(self, n_modes: int) -> "FieldShapes":
         return replace(self, vectors=self.vectors[:, :n_modes].copy())
+
+    def after(self, first: "FieldShapes") -> "FieldShapes":
+        """The same, which shares the static deflections of the ``first`` modes: those need no mesh for short waves."""
+        return replace(self, _under=first._under)
