@@ -68,7 +68,8 @@ def map_scene(
     if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):
         raise ValueError(f"over must map the names of axes to their values, got {check.shown(over)}")
     band = table.get("max_frequency") if max_frequency is None else max_frequency
-    limit = check.tolerance(scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
+    with scene.blame("strike", () if tolerance is None else ("tolerance",)):
+        limit = check.tolerance(scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
     if not over:
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
@@ -76,7 +77,8 @@ def map_scene(
     scene, model = for_many(scene, limit, wanted.get("stage"))
     law, stretches = scene.make_contact(), bool(scene.target.values.get("stretching"))
     anew = check_axes(scene, over)
-    over, ours = laid_out(over, law, alone=stretches, cells=wanted.pop("cells", None))
+    with scene.blame("map", ("cells",)):
+        over, ours = laid_out(over, law, alone=stretches, cells=wanted.pop("cells", None))
     slow = {name: list(over[name]) for name in anew}
     quick = {name: values for name, values in over.items() if name not in slow}
     shared = quick or {"strike.speed": [scene.blow.values["speed"]]}
@@ -102,6 +104,7 @@ def map_scene(
         pieces.append(_quick_map(changed, shared, band, limit, {**wanted, "store": own, "ours": ours, "tell": tell}))
     result = _joined(pieces, slow)
     result = result if quick else result.isel(speed=0, drop=True)
+    result = result.transpose(*(ALIASES.get(name, name) for name in over), ...)
     result.attrs["scene"] = json.dumps(
         {**scene.data(), "map": {name: list(map(export.plain, v)) for name, v in over.items()}}
     )
@@ -131,6 +134,8 @@ def _quick_map(
         case, axes = job.described(scene.built, over, stages)
     except check.SimulationError as error:
         raise check.SimulationError(f"{scene.path}: {error}") from None
+    except ValueError as error:  # of the axes, unless it names the file and another table
+        raise error if str(error).startswith(check.line(str(scene.path))) else scene.fault(f"[map] {error}") from None
     return with_theory(grid.compute_map(job.cases(case, axes), job), case, axes)
 
 
@@ -239,7 +244,7 @@ def draw(
 def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
     """Contours of contact resonance, and of where it equals the threshold, as far as they cross the map."""
     resonance = table.contact_resonance.broadcast_like(values).transpose(*values.dims)
-    if np.ptp(resonance.values) == 0.0:
+    if np.ptp(resonance.values) == 0.0 or min(values.shape) == 1:
         return []
     low, high = float(resonance.min()), float(resonance.max())
     decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))

@@ -137,7 +137,8 @@ def plan_sequence(scene: "Scene", watch: Watch | None = None, **changes: Any) ->
     if wrong:
         raise ValueError(f"{wrong[0]} must be left out for a scene with strokes; it takes {', '.join(TAKEN)}")
     wanted = {name: changes[name] for name in (*OF_SEQUENCE[:2], *OF_BODY) if changes.get(name) is not None}
-    tolerance = check.tolerance(wanted.get("tolerance", scene.blow.values.get("tolerance", TOLERANCE)))
+    with scene.blame("strike", wanted):
+        tolerance = check.tolerance(wanted.get("tolerance", scene.blow.values.get("tolerance", TOLERANCE)))
     wanted |= {"target": "modal", "tolerance": playing.EACH * tolerance}
     order = played_order(scene)
     parts, alone = [scene.stroke[i] for i in order], [scene.alone(i) for i in order]

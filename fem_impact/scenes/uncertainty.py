@@ -147,7 +147,8 @@ def spread(
     workers = None if workers is None else check.count("workers", workers)
     groups, why = _grouped(sobol, mixer, n, len(inputs))
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
-    limit = check.tolerance(blow.arguments.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
+    with blow.target.blame("strike", () if tolerance is None else ("tolerance",)):
+        limit = check.tolerance(blow.arguments.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
     d = len(inputs)
     points = sobol_points(shares(n // (d + 2), 2 * d, seed)) if groups else shares(n, d, seed)
     values = drawn_inputs(inputs, points, mixer)

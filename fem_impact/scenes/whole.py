@@ -5,6 +5,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .._base import check
 from ..fe.assembly import THICK
 from ..impact.stepping import Options
@@ -150,5 +152,5 @@ def _check_place(scene: "Scene", name: str, value: Any) -> None:
     listed = isinstance(value, (list, tuple)) and len(value) == 2
     line = scene.mesh.kind == "line" or (scene.mesh.kind == "file" and not listed)  # which holds either
     places = check.places(name, value, 1 if line else 2)
-    if len(places) != 1:
+    if len(places) != 1 or np.ndim(value) > 1:
         raise ValueError(f"{name} must be one point, got {check.shown(value)}")

@@ -54,7 +54,8 @@ def body_of(
     speed = check.positive("speed", blow.arguments["speed"], "m/s", reach=REACH)
 
     def started(modes: Modes) -> Case:
-        return Case(modes, blow.striker, blow.contact, modes.point("at", blow.arguments["at"])[0], speed)
+        with target.blame("strike"):
+            return Case(modes, blow.striker, blow.contact, modes.point("at", blow.arguments["at"])[0], speed)
 
     if target.modes is not None:
         case = started(target.finished(target.modes))

@@ -83,6 +83,9 @@ def laid_out(
     if cells is not None:
         check.count("cells", cells, low=2, high=MOST_VALUES)
     found = {name: read_axis(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
+    for name, values in found.items():
+        if not isinstance(values, partial) and not np.size(values):
+            raise ValueError(f"over[{name!r}] must contain at least one value")
     free = [name for name, values in found.items() if isinstance(values, partial)]
     if not free:
         return found, False
@@ -215,8 +218,6 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
             axes[name] = base.modes.points("over['at']", values)
         else:
             axes[name] = check.array(f"over[{given!r}]", values, (None,), AXES[name][0])
-        if not len(axes[name]):
-            raise ValueError(f"over[{given!r}] must contain at least one value")
         if name != "at":
             for value in (axes[name].min(), axes[name].max()):  # what lies between allowed values is allowed
                 if name not in (*LAW, "damping_ratio"):

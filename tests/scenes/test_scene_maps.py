@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -70,6 +71,32 @@ def test_axes_that_do_not_rescale_the_body_make_it_anew(line, axes, tmp_path):
         assert worst(table.isel({dimension: 0}), hit) < 2e-3  # 1e-3 each
         with pytest.raises(ValueError, match=f"vary: {name} does not rescale air"):
             fi.spread(scene, {name: f"lognormal({value}, 0.1)"}, n=8)
+
+
+def test_axes_keep_their_order_and_may_have_one_value(tmp_path, prompt):
+    over = 'over = { "contact.stiffness" = [1e4, 3e4], "mesh.length" = [0.465] }\n'
+    load_text(tmp_path, QUICK.partition("[map]")[0] + f"[map]\n{over}")
+    said = prompt(f"map {tmp_path / 'scene.toml'} --out {tmp_path / 'out'}")
+    assert said.status == 0 and "over stiffness (2), mesh.length (1)" in said.out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("at = [0.1395", "at = [9.0", "[strike] at must lie on the body"),
+        ("at = [0.1395, 0.09]", "at = [[0.1395, 0.09]]", "[strike] at must be one point"),
+        ("tolerance = 1e-2", "tolerance = 7.0", "[strike] tolerance must lie between"),
+        ("OVER", "mass = [-1.0, 1.0]", "[map] over['mass'] must be positive, got -1 kg"),
+        ("OVER", '"contact.hysteresis" = [2.0]', "[map] hysteresis must lie between 0 and 1, got 2"),
+        ("OVER", "mass = [[1.0]]", "[map] over['mass'] must have shape"),
+        ("OVER", '"target.mass" = []', "[map] over['target.mass'] must contain at least one value"),
+        ("OVER", '"mesh.length" = []', "[map] over['mesh.length'] must contain at least one value"),
+    ],
+)
+def test_errors_of_many_blows_name_the_file_and_the_table(old, new, said, tmp_path):
+    text = QUICK.partition("[map]")[0] + "[map.over]\n" + ("OVER" if old == "OVER" else "mass = [0.1]")
+    with pytest.raises(ValueError, match=re.escape(f"scene.toml: {said}")):
+        maps.map_scene(load_text(tmp_path, edited(old, new, text)))
 
 
 @pytest.mark.parametrize("line", ["", 'air = "both sides"'])
