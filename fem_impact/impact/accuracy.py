@@ -34,6 +34,13 @@ def contact_resonance(contact: Contact, mass: float, speed: float) -> float:
     return 0.5 / contact_duration(contact, mass, speed)
 
 
+def contact_swing(contact: Contact, mass: float, speed: float) -> float:
+    """Frequency [rad/s] up to which a contact excites what it touches: its resonance, or that on its hard layer."""
+    whole = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    hard = contact.law.steepest(contact, np.asarray(0.5 * mass * speed**2)) if contact.hard_stiffness else 0.0
+    return max(whole, float(np.sqrt(hard / mass)))
+
+
 def number_of_modes(modes: Modes, frequency: float) -> float:
     """About how many modes a body has up to a frequency [Hz]; Weyl's law gives that on average, so a tenth is added."""
     return 1.1 * modes.n_modes * (frequency / modes.frequencies[-1]) ** (0.5 * modes.dimension)
@@ -54,7 +61,7 @@ def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, sp
     """
     tolerance = check.positive("tolerance", tolerance)
     density, s = left_out_density(modes, modes.point("at", at))
-    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    omega_0 = contact_swing(contact, mass, speed)
     return cutoff(density, s, omega_0, contact.exponent, mass, tolerance)
 
 
@@ -72,7 +79,7 @@ def tail_cutoff(
     modes: Modes, point: np.ndarray, *, contact: Contact, mass: float, speed: float, tolerance: float
 ) -> float:
     """As `cutoff_frequency`, for modes that hold the whole compliance at a point (1, dimension) [m] themselves."""
-    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    omega_0 = contact_swing(contact, mass, speed)
     omega, rows = modes.omega[modes.n_rigid :], modes.shapes.at(point)[0, modes.n_rigid :]
     softness = mass * omega_0**2 * np.append(np.cumsum(((rows / omega) ** 2)[::-1])[::-1], 0.0)[1:]  # of those above
     error = left_out_error(softness, omega_0 / omega, contact.exponent, modes.dimension)
@@ -85,7 +92,7 @@ def truncation_error(
     modes: Modes, at: Any, max_frequency: float, *, contact: Contact, mass: float, speed: float
 ) -> float:
     """Expected error [-] if the modes above a frequency [Hz] are left out; the inverse of `cutoff_frequency`."""
-    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    omega_0 = contact_swing(contact, mass, speed)
     density, s = left_out_density(modes, modes.point("at", at))
     omega_c = 2.0 * np.pi * check.positive("max_frequency", max_frequency, "Hz")
     rest = density / ((1.0 + s) * omega_c ** (1.0 + s))

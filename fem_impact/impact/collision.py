@@ -296,7 +296,7 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
     if modes.n_modes == modes.n_rigid:
         return modes.n_rigid, 0.0
     allowed = 0.05 * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
-    omega_0 = 2.0 * np.pi * accuracy.contact_resonance(contact, mass, speed)
+    omega_0 = accuracy.contact_swing(contact, mass, speed)
     whole, density, s = striker.bending_compliance
     if not contact.rated and mass * omega_0**2 * whole <= allowed:  # what replaces modes under loss needs one below
         return modes.n_rigid, allowed

@@ -169,9 +169,9 @@ class Asked:
 
     def highest(self, mobility: float) -> float:
         """Frequency [Hz] above which a plate of a mobility [m/(N s)] acts as a spring."""
-        density, resonance = 2.0 * mobility / np.pi, accuracy.contact_resonance(mass=self.mass, **self.law)
+        density, swing = 2.0 * mobility / np.pi, accuracy.contact_swing(mass=self.mass, **self.law)
         allowed, exponent = self.budget.for_left_out, self.blow.contact.exponent
-        return accuracy.cutoff(density, 0.0, 2.0 * np.pi * resonance, exponent, self.mass, allowed)
+        return accuracy.cutoff(density, 0.0, swing, exponent, self.mass, allowed)
 
     @property
     def unfit(self) -> str:
