@@ -349,9 +349,13 @@ class Scene(check.Brief):
             )
 
     def check_unpushed(self) -> None:
-        """Raise ValueError if a force or an early end is given, which maps, spreads and the live page do not follow."""
-        self.make_striker().let_go("a map, a spread or the live page")
-        for name in ("striker_force", "target_force", "duration", "max_impacts"):
+        """Raise ValueError if something is given that maps, spreads and the live page do not follow.
+
+        That is a force, an early end, or steps of one's own.
+        """
+        with self.blame("striker"):
+            self.make_striker().let_go("a map, a spread or the live page")
+        for name in ("striker_force", "target_force", "duration", "max_impacts", "dt", "scheme"):
             if self.blow.values.get(name):
                 raise self.fault(
                     f"[strike] {name} must be left out here: maps, spreads and live pages follow whole blows without it"
