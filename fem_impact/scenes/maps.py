@@ -244,7 +244,9 @@ def draw(
 def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
     """Contours of contact resonance, and of where it equals the threshold, as far as they cross the map."""
     resonance = table.contact_resonance.broadcast_like(values).transpose(*values.dims)
-    if np.ptp(resonance.values) == 0.0 or min(values.shape) == 1:
+    steps = [np.sign(np.diff(np.asarray(table[name], float))) for name in values.dims if name in table.coords]
+    ordered = all(each.any() and (each == each[0]).all() for each in steps)  # no value twice, none out of turn
+    if np.ptp(resonance.values) == 0.0 or min(values.shape) == 1 or not ordered:
         return []
     low, high = float(resonance.min()), float(resonance.max())
     decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))

@@ -74,10 +74,16 @@ def test_axes_that_do_not_rescale_the_body_make_it_anew(line, axes, tmp_path):
 
 
 def test_axes_keep_their_order_and_may_have_one_value(tmp_path, prompt):
-    over = 'over = { "contact.stiffness" = [1e4, 3e4], "mesh.length" = [0.465] }\n'
-    load_text(tmp_path, QUICK.partition("[map]")[0] + f"[map]\n{over}")
+    over = '"contact.stiffness" = [1e4, 3e4], "mesh.length" = [0.465]'
+    load_text(tmp_path, QUICK.partition("[map]")[0] + f"[map]\nover = {{ {over} }}\n")
     said = prompt(f"map {tmp_path / 'scene.toml'} --out {tmp_path / 'out'}")
     assert said.status == 0 and "over stiffness (2), mesh.length (1)" in said.out
+
+
+@pytest.mark.parametrize("masses", [[0.1, 0.1, 0.02], [0.1, 0.02, 0.05]])
+def test_axes_with_values_twice_or_out_of_turn_are_drawn(scene, masses):
+    table = maps.map_scene(scene, over={"mass": masses, "stiffness": [1e4, 1e5]})
+    assert maps.draw(table, "contact_time").axes
 
 
 @pytest.mark.parametrize(
