@@ -373,11 +373,13 @@ def layer_size(stiffness: float, tension: float, extent: float) -> float:
 
 
 def refine(
-    system: System, n_modes: int | None, max_frequency: float | None, tolerance: float, of_mesh: bool = False
-) -> Spectrum:
+    system: System, n_modes: int | None, max_frequency: float | None, tolerance: float, of_mesh: bool = False,
+    enough: float = 0.0,
+) -> Spectrum:  # fmt: skip
     """Find modes with an estimated relative error below a tolerance, refining the mesh as often as needed.
 
-    If only the error ``of_mesh`` must be below it, that by a rise which is known at points may be larger.
+    If only the error ``of_mesh`` must be below it, that by a rise which is known at points may be larger. Where no mesh
+    meets the tolerance, an error up to ``enough`` will do.
 
     The shortest wave sets the size of the first mesh. If edges or corners need a finer one, the estimated errors set
     the size of the next, which aims at 60 % of the tolerance. Where eight more do not suffice, rounding or corners hold
@@ -415,6 +417,8 @@ def refine(
         closer = max(step, FLATTER**0.5) if bent else step  # halves some triangles
         finer = reassemble(system, mesh.refined(step), layer=found.system.layer / closer)
         found = solve_on_mesh(finer, n_modes, max_frequency)
+    if error <= enough:
+        return found
     mode = int(found.error.argmax())
     least = float(f"{2.0 * found.error[mode]:.1e}")  # where corners hold the error, it differs from mesh to mesh
     slips = plausible.doubted_sizes(np.ptp(found.system.mesh.points, axis=0), found.system.section)

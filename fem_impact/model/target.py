@@ -36,6 +36,7 @@ from ..modes.air import in_air
 from ..modes.modal import Damping, Modes
 from ..modes.shapes import FieldShapes
 from ..modes.stretching import HELD
+from .budget import CHEAP
 
 LOG = logging.getLogger(__name__)
 MODELS = ("stated", "auto")  # whether the theory and the air of a target are chosen
@@ -220,8 +221,26 @@ class Target:
         if self.closed is not None and self.source != "fe":
             modes = self.closed(n_modes=FIRST_LOOK)
         else:
-            modes = self.find(FIRST_FLEXIBLE, tolerance=CLOSE)
+            modes = self.first_flexible
         return float(self.finished(modes).frequencies[-1] / modes.frequencies[-1])
+
+    @cached_property
+    def first_flexible(self) -> Modes:
+        """The modes up to the first that bends the body, to 1e-6, or as close as corners let any mesh come."""
+        return self.find(FIRST_FLEXIBLE, tolerance=CLOSE, enough=refinement.LOOSEST)
+
+    def check_first(self, tolerance: float) -> None:
+        """Raise SimulationError if the first mode, to which the body is scaled, is too uncertain for a tolerance."""
+        if "first_frequency" not in self.scale or self.closed is not None:
+            return
+        errors, omega = self.first_flexible.frequency_error, self.first_flexible.omega
+        error = 0.0 if errors is None else float(errors[omega > 0.0][0])
+        if error > (allowed := 2.0 * CHEAP * tolerance):
+            raise check.SimulationError(
+                f"the first mode, which first_frequency sets, is uncertain by {error:.1e} on any mesh, and "
+                f"tolerance = {tolerance:g} allows {allowed:.1e}; give a tolerance of at least "
+                f"{float(f'{1.1 * error / allowed * tolerance:.1e}'):g}"
+            )
 
     def wave(self, frequency: float, tense: bool = True) -> float:
         """Largest wavenumber [rad/m] of the plate's own waves, before scaling, at a frequency [Hz].
@@ -329,28 +348,29 @@ class Target:
         first: Modes | None = None,
         stages: Stages | None = None,
         keep: Any = None,
+        enough: float = 0.0,
     ) -> Modes:
         """Modes before `finished`: the first ``n_modes``, or those up to a frequency [Hz] if it is given.
 
-        ``tolerance`` [-] is the largest error of the first modes' frequencies; an element ``size`` [m] replaces the
-        mesh's own. The mesh of modes found ``first`` is refined if it cannot resolve the frequency. ``stages`` measure
-        meshing and assembly; ``keep`` as in `find_modes`.
+        ``tolerance`` [-] is the largest error of the first modes' frequencies, or ``enough`` where no mesh comes as
+        close; an element ``size`` [m] replaces the mesh's own. The mesh of modes found ``first`` is refined if it
+        cannot resolve the frequency. ``stages`` measure meshing and assembly; ``keep`` as in `find_modes`.
         """
         reach: dict[str, Any] = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
         if self.modes is not None:
             return self.modes.truncated(**reach)
-        find = partial(self._found, reach, tolerance, size, first, stages, keep)
+        find = partial(self._found, reach, (tolerance, enough), size, first, stages, keep)
         if reach == {"n_modes": FIRST_LOOK} and first is None and keep is None:  # plans of several blows share them
             return self._known.recall((tolerance, size), find)
         return find()
 
     def _found(
-        self, reach: Mapping[str, Any], tolerance: float, size: float | None, first: Modes | None,
+        self, reach: Mapping[str, Any], close: tuple[float, float], size: float | None, first: Modes | None,
         stages: Stages | None, keep: Any,
     ) -> Modes:  # fmt: skip
         """What `find` finds of a body whose modes are not known."""
         wanted = reach.get("n_modes"), reach.get("max_frequency")
-        insisted, allowed = size is not None or self.size_stated, min(tolerance, refinement.LOOSEST)
+        insisted, allowed = size is not None or self.size_stated, min(close[0], refinement.LOOSEST)
         if self.kind == "analytic" and (size is None or self.source == "analytic"):
             assert self.closed is not None
             with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
@@ -360,7 +380,7 @@ class Target:
         with self.blame("mesh"), np.errstate(all="ignore"):
             if body is not None:
                 if not insisted:
-                    return finding.modes_of(refinement.refine(body, *wanted, allowed, of_mesh=True))
+                    return finding.modes_of(refinement.refine(body, *wanted, allowed, True, close[1]))
                 return finding.find_modes(body, **reach, keep=keep)
             # start from the mesh of the first modes and refine it where waves are too short
             assert isinstance(shapes, FieldShapes)

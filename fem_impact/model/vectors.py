@@ -77,6 +77,7 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     assert mesh is not None and isinstance(section, Plate)
     if target.size_stated:
         return mesh.size
+    target.check_first(tolerance)
     highest = resonance * _stricter(1.6, 0.37, tolerance) / target.stretch
     size = min(max(mesh.size, refinement.affordable_size(mesh)), ARGYRIS.wave / target.wave(highest))
     if section.tension:

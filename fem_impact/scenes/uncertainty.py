@@ -21,7 +21,7 @@ from ..impact.measured import ENDS
 from ..impact.parameters import BAR, PLATE, ROD
 from ..impact.striker import Striker
 from ..model.planner import Blow
-from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
+from ..model.target import Target
 from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, grid
@@ -275,7 +275,7 @@ class _SpreadAsked:
         target, at, speed = blow.target, blow.arguments["at"], blow.arguments["speed"]
         first = None
         if self.body:
-            first = target.modes or target.surrounded(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
+            first = target.modes or target.surrounded(target.first_flexible)
         wide = axes | self._of_modes(first)
         ends: dict[str, Any] = {name: np.unique([column.min(), column.max()]) for name, column in wide.items()}
         if self.places:

@@ -22,7 +22,7 @@ from ..model.asked import refine
 from ..model.budget import FINEST, Budget
 from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow
-from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
+from ..model.target import FIRST_LOOK, Elements, Stages, Target
 from ..model.vectors import RitzTarget
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
@@ -130,7 +130,7 @@ def by_vectors(
     mesh, as that of a single blow does.
     """
     if "target_frequency" in axes:
-        first = target.finished(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
+        first = target.finished(target.first_flexible)
         case = replace(case, first=float(first.frequencies[first.omega > 0.0][0]))
     points = axes.get("at", case.at[None])
     views: Views | None = None

@@ -271,3 +271,26 @@ def test_frequencies_not_exact_enough_are_named_with_the_tolerance_of_the_blow(m
     said = "^tolerance = 0.001 of the blow is 5 times that of its frequencies: tolerance = 0.0002 is"
     with pytest.raises(fi.SimulationError, match=said):
         fi.plan(bar, fi.Striker.rigid(1e-3), SOFT, at=0.2, speed=1.0, tolerance=1e-3, target="modal")
+
+
+def test_a_plate_whose_corners_hold_the_error_of_its_first_mode_is_scaled_to_it_as_exactly_as_a_blow_asks(tmp_path):
+    """The L errs by 1.3e-5 on any mesh; it was refused whatever the tolerance, as 1e-6 was asked of that mode."""
+    text = """
+        material = { E = 70e9, nu = 0.3, rho = 2700.0 }
+        section = { kind = "plate", thickness = 2e-3 }
+        mesh.shape = "polygon"
+        mesh.corners = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.2], [0.2, 0.2], [0.2, 0.4], [0.0, 0.4]]
+        supports.boundary = "hinged"
+        target = { first_frequency = 100.0, damping_ratio = 0.01 }
+        striker = { kind = "rigid", mass = 0.02 }
+        contact = { kind = "hertz", stiffness = 1e8 }
+        strike = { at = [0.1, 0.1], speed = 1.0, tolerance = 1e-2 }
+    """
+    scene = load_text(tmp_path, text)
+    target = scene.built.target
+    as_stated = fi.Plate(target.section.material, 2e-3)
+    own = fi.find_modes(fi.assemble(target.mesh, as_stated, {"boundary": "hinged"}), n_modes=1, tolerance=1e-4)
+    assert target.stretch == pytest.approx(100.0 / own.frequencies[0], rel=1e-4)
+    assert scene.strike().tolerance_met
+    with pytest.raises(fi.SimulationError, match=r"scene\.toml: the first mode, which .* give a tolerance of at least"):
+        scene.plan(tolerance=1e-5)
