@@ -97,7 +97,7 @@ class Contact(Numbers):
         ----------
         sphere : Striker
             Made by `Striker.sphere`.
-        plate : Plate or Material
+        plate : Plate, Beam or Material
             The flat body; isotropic. For wood, give an isotropic `Material` with its stiffness across the thickness.
         yield_strength : float [Pa], optional
             Of the softer body. The contact then yields as soon as its largest pressure is 1.6 times this; far beyond,
@@ -117,6 +117,10 @@ class Contact(Numbers):
         for name in ("material", "radius"):
             if getattr(sphere, name, None) is None:
                 raise ValueError(f"sphere must be made by Striker.sphere, got {check.shown(sphere)} without {name}")
+        if getattr(plate, "round", False):
+            raise ValueError(
+                "plate must be flat, not a round beam; use Contact.hertz with the stiffness of round bodies"
+            )
         compliance = 0.0
         for name, material in (("sphere", sphere.material), ("plate", getattr(plate, "material", plate))):
             E, nu = getattr(material, "E", None), getattr(material, "nu", None)

@@ -458,7 +458,8 @@ class Scene(check.Brief):
     def make_contact(self) -> Contact:
         if self.contact.kind != "between":
             return self._make("contact", self.contact)
-        return self._make("contact", self.contact, sphere=self.make_striker(), plate=self.make_section("plate"))
+        section = self.make_section("plate" if self.section is None else self.section.kind)
+        return self._make("contact", self.contact, sphere=self.make_striker(), plate=section)
 
     def _make(self, table: str, part: Part, **supplied: Any) -> Any:
         with self.blame(table), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse

@@ -51,6 +51,7 @@ test_errors_name_argument_rule_and_value = refusing([
     (lambda: fi.Contact.restituting(1e5, 1.5, restitution=0.5, speed=0.0), "speed must be positive"),
     (lambda: fi.Contact.between(fi.Striker.rigid(1.0), None), "sphere must be made by Striker.sphere"),
     (lambda: fi.Contact.between(SPHERE, WOODEN), "plate must have an isotropic material"),
+    (lambda: fi.Contact.between(SPHERE, fi.Beam.circular(SPHERE.material, diameter=0.01)), "plate must be flat"),
     (lambda: fi.Contact(1e6, 1.5, loss=0.1, hysteresis=0.5, relaxation=1e-3), "loss and hysteresis"),
     (lambda: fi.Contact(1e6, 1.5, yield_approach=1e-4, hard_stiffness=1e9), "yield_approach and hard_stiffness"),
     (lambda: fi.Contact(1e6, 1.5, hysteresis=0.5), "relaxation must be positive"),

@@ -297,3 +297,18 @@ def test_a_scene_written_again_keeps_its_words_and_numbers(tmp_path):
     tables = load_text(tmp_path, TITLED).data(speed=np.float64(0.1) * 3.0) | {"title": 'µ "drum" \\ \U0001f941 −'}
     assert load_text(tmp_path, toml_text(tables)).data() == tables
     assert tomllib.loads(toml_text({"title": "\x7f"})) == {"title": "\x7f"}
+
+
+def test_a_ball_meets_a_flat_bar_as_it_meets_any_flat_body_of_the_material(tmp_path):
+    """The kind of the section was blamed, as if only plates were flat."""
+    text = """
+        mesh = { shape = "line", length = 1.0 }
+        material = { E = 10e9, nu = 0.3, rho = 500.0 }
+        section = { kind = "beam", width = 0.03, height = 0.01 }
+        striker = { kind = "sphere", radius = 0.01, E = 210e9, nu = 0.3, rho = 7850.0 }
+        contact = { kind = "between" }
+        strike = { at = [0.3], speed = 1.0 }
+    """
+    scene = load_text(tmp_path, text)
+    flat = fi.Contact.between(scene.make_striker(), scene.built.target.section.material)
+    assert scene.make_contact() == flat and scene.strike().tolerance_met
