@@ -134,6 +134,19 @@ def test_thin_curved_plates_become_kirchhoff_plates(edge):
     assert_allclose(found.omega, exact.omega, rtol=5e-6)  # 1e-6; the theories differ by 1e-9
 
 
+@pytest.mark.slow
+def test_what_layers_of_free_edges_miss_is_claimed_where_they_are_hardly_resolved():
+    """Facets below four thicknesses counted as fine: a tenth of the error was claimed; above, seventy times as much."""
+    plate = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), 3e-3)
+    system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate, {"left": "clamped"}, theory="mindlin")
+    fine = refinement.solve_on_mesh(reassemble(system, system.mesh.refined(1.5), layer=0.5), 8, None)
+    for layer in (1.0, 2.0):
+        found = refinement.solve_on_mesh(reassemble(system, system.mesh, layer=layer), 8, None)
+        true = np.abs(found.omega / fine.omega - 1.0)
+        assert (true <= found.error).all()
+        assert found.error.max() < 30.0 * true.max()
+
+
 def test_a_layer_too_thin_for_the_mesh_is_told_as_an_error():
     """The layer of a free disk is a hundredth of its radius, a facet a quarter; first-order theory tells its cost."""
     exact = thick_elements.disk_frequencies(0.02, "free", 5)
