@@ -443,7 +443,8 @@ def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.
         low[i + 1] = low[i]
     for i in close[::-1]:
         high[i] = high[i + 1]
-    edge = 1e-3 * (high - low)
+    edge = 1e-3 * (high - low)  # of frequencies, of the nearer end: neighbours may lie closer than this
+    edge[:n] = 1e-3 * np.minimum(high[:n] - start[0], start[0] - low[:n])
     x, caution, cost = np.clip(start.ravel(), low + edge, high - edge), 1e-3, np.inf
     best = x
     for _ in range(steps):

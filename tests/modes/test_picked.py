@@ -56,6 +56,15 @@ def test_known_modes_are_found_again(unit, kind):
     assert any("% rms are left unexplained" in note for note in found.notes)
 
 
+def test_the_lowest_two_modes_may_be_a_hundredth_apart():
+    """Five half-power widths, while the band ends so far below that a thousandth of the way there exceeds them."""
+    known = {"points": [[0.0]], "mass": 2.0, "damping_ratio": 1e-3, "complete": True}
+    pair = fi.Modes.from_arrays([300.0, 303.0], [[0.9, 0.8]], **known)
+    found = picked.pick("frf", responses(pair, [[0.0]]))
+    assert found.frequencies == pytest.approx([300.0, 303.0], rel=1e-4)
+    assert found.products[0] == pytest.approx([0.81, 0.64], rel=0.02)
+
+
 def test_errors_of_picked_shapes_cover_them_and_reach_the_blow():
     """Twenty times the noise of the other tests; the truth within three times the error stated of each mode."""
     found = fi.Modes.from_frf(responses(noise=2e-2), mass=0.188, points=POINTS, driving="p0")
