@@ -89,8 +89,6 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
             )
     if not found.segments or not found.names:
         raise ValueError(f"{path.name} holds no channels")
-    if found.rate is not None and not 0.0 < found.rate <= 1e12:
-        raise ValueError(f"{path.name} states a rate of {found.rate:g} Hz")
     names, unit, notes = (tuple(map(check.line, texts)) for texts in (found.names, found.units, found.notes))
     return kept.flatten(KINDS, recording=replace(found, names=names, units=unit, notes=notes))
 
@@ -268,12 +266,13 @@ def table(path: Path) -> Recording:
         raise ValueError(f"{path.name} has no rows of numbers in its first {HEADER_LINES} lines")
     start, row = first
     width, use = len(row), [i for i, cell in enumerate(row) if cell]
+    ended = len(lines[start].split(separator))  # columns of a heading whose last one is empty below it
     if width > MOST_CHANNELS:
         raise ValueError(f"{path.name} has {width} columns; at most {MOST_CHANNELS} can be read")
     said = [line.lstrip(" #%/") for line in whole[: whole.index(lines[start])] if line not in lines]
     for above in (lines[:start], said if commented else []):  # a comment may be a heading, as numpy.savetxt writes it
         heads = [[line.strip(' "')] if width == 1 else _cells(line, separator) for line in above]
-        heads = [cells for cells in heads if len(cells) == width and any(cells)]
+        heads = [cells[:width] for cells in heads if len(cells) in (width, ended) and any(cells)]
         if heads:
             break
     names, unit = [f"column {i + 1}" for i in range(width)], [""] * width

@@ -335,6 +335,8 @@ def read_taps(
     found = readers.read(path)
     name = check.path("path", path).name
     stated = found.rate if rate is None else check.between("rate", rate, *RATES, "Hz")
+    if stated is not None and not RATES[0] <= stated <= RATES[1]:
+        raise ValueError(f"{name} states a rate of {stated:g} Hz; check the unit of its times, or give rate=")
     if stated is None:
         raise ValueError(f"rate must be given: {name} does not state the sampling rate")
     notes = list(found.notes)

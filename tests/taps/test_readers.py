@@ -197,6 +197,17 @@ def test_tables_as_numpy_and_spreadsheets_write_them(tmp_path):
     (tmp_path / "b.csv").write_text("\n".join(["Time [ns];;Force [N]", *rows]))
     units, rate, _, got = recording(tmp_path / "b.csv")
     assert (units, rate) == (["N"], RATE) and got[:, 0].tolist() == force.tolist()
+    rows = [f"{1e3 * t:.6f},{f}," for t, f in zip(time, force)]  # the last column is empty
+    (tmp_path / "c.csv").write_text("\n".join(["Time [ms],Force [kN],Accel [g]", *rows]))
+    units, rate, _, got = recording(tmp_path / "c.csv")
+    assert (units, rate) == (["kN"], RATE) and got[:, 0].tolist() == force.tolist()
+
+
+def test_a_rate_of_no_rig_is_refused_and_may_be_given(tmp_path):
+    path = table(tmp_path / "t.csv", "Time [s],Force [N]\n", (1e6 * TIME, FORCE))
+    with pytest.raises(ValueError, match=r"^t\.csv states a rate of 0\.02 Hz; check the unit of its times, or give"):
+        fi.read_taps(path)
+    assert fi.read_taps(path, rate=RATE).n_taps == 2
 
 
 @pytest.mark.parametrize(
