@@ -369,28 +369,33 @@ class Target:
         stages: Stages | None, keep: Any,
     ) -> Modes:  # fmt: skip
         """What `find` finds of a body whose modes are not known."""
-        wanted = reach.get("n_modes"), reach.get("max_frequency")
         insisted, allowed = size is not None or self.size_stated, min(close[0], refinement.LOOSEST)
         if self.kind == "analytic" and (size is None or self.source == "analytic"):
             assert self.closed is not None
             with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
                 return self.closed(**reach)
-        shapes = None if first is None else first.shapes
-        body = self.assembled(stages or Stages(), size) if shapes is None else None
+        if first is not None:
+            return self._following(first, reach, allowed, insisted, keep)
+        body = self.assembled(stages or Stages(), size)
         with self.blame("mesh"), np.errstate(all="ignore"):
-            if body is not None:
-                if not insisted:
-                    return finding.modes_of(refinement.refine(body, *wanted, allowed, True, close[1]))
+            if insisted:
                 return finding.find_modes(body, **reach, keep=keep)
-            # start from the mesh of the first modes and refine it where waves are too short
-            assert isinstance(shapes, FieldShapes)
-            body = replace(shapes.system, mesh=replace(shapes.system.mesh, size_stated=insisted))
+            return finding.modes_of(
+                refinement.refine(body, reach.get("n_modes"), reach.get("max_frequency"), allowed, True, close[1])
+            )
+
+    def _following(self, first: Modes, reach: Mapping[str, Any], allowed: float, insisted: bool, keep: Any) -> Modes:
+        """Modes from the mesh of the ``first`` ones, refined where it is too coarse for their waves."""
+        assert isinstance(first.shapes, FieldShapes)
+        body = first.shapes.system
+        with self.blame("mesh"), np.errstate(all="ignore"):
             side = refinement.longest_side(body.rules, allowed)
-            body = refinement.fine_enough(body, refinement.size_for(body, *wanted, side))
+            size = refinement.size_for(body, reach.get("n_modes"), reach.get("max_frequency"), side)
+            body = refinement.fine_enough(replace(body, mesh=replace(body.mesh, size_stated=insisted)), size)
             body = replace(body, mesh=replace(body.mesh, size_stated=True))
             modes = finding.find_modes(body, **reach, keep=keep)
             assert isinstance(modes.shapes, FieldShapes)
-            return replace(modes, shapes=modes.shapes.after(shapes))
+            return replace(modes, shapes=modes.shapes.after(first.shapes))
 
     def number_below(self, modes: Modes, limit: float) -> float:
         """About how many modes there are below a frequency [Hz], by Weyl's law from the first ones, all as struck.
