@@ -330,9 +330,7 @@ def _with_one_more(
     place = int(np.where(apart, size, 0.0).argmax())
     width = np.median(before.poles[1]) if n else np.log(_damping(omega, size, place))
     start = np.column_stack([before.poles, [np.log(omega[place] if at is None else at), width]])
-    after = _fit(omega, data, weight, start[:, np.argsort(start[0])])
-    if after.poles.shape[1] != n + 1:
-        return None
+    after = _fit(omega, data, weight, start[:, np.argsort(start[0])])  # one may run away, which the others replace
     natural, damping = np.exp(after.poles)
     near = np.diff(natural) < (damping * natural)[1:]
     gain = np.square(before.rest).sum() - np.square(after.rest).sum()

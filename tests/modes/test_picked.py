@@ -65,6 +65,15 @@ def test_the_lowest_two_modes_may_be_a_hundredth_apart():
     assert found.products[0] == pytest.approx([0.81, 0.64], rel=0.02)
 
 
+def test_a_mode_beside_another_is_found_though_the_first_look_is_elsewhere():
+    """A mode sought where a hasty fit leaves most runs away, while it mends the others: it is sought again."""
+    frequencies, deflections = [72.6, 98.9, 164.5, 241.3, 243.7, 307.1], [0.66, 0.63, 0.43, 0.33, 0.97, 0.6]
+    known = {"points": [[0.0]], "mass": 2.0, "damping_ratio": 0.0032, "complete": True}
+    found = picked.pick("frf", responses(fi.Modes.from_arrays(frequencies, [deflections], **known), [[0.0]]))
+    assert found.frequencies == pytest.approx(frequencies, rel=1e-3)
+    assert np.sqrt(found.products[0]) == pytest.approx(deflections, rel=0.05)
+
+
 def test_errors_of_picked_shapes_cover_them_and_reach_the_blow():
     """Twenty times the noise of the other tests; the truth within three times the error stated of each mode."""
     found = fi.Modes.from_frf(responses(noise=2e-2), mass=0.188, points=POINTS, driving="p0")
