@@ -56,10 +56,9 @@ class Vectors(Description):
             return None
         band, most = asked.quantities.get("sound"), MOST_MODES["fe"]
         if band is not None and (rings := target.count_below(band / target.stretch)) > most:
-            reach = 0.9 * band * most / rings
             raise check.SimulationError(
                 f"the sound up to {band:g} Hz needs about {rings:.2g} modes, more than the limit of {most}; "
-                f"give a band of the quantity of at most {float(f'{reach:.1e}'):g} Hz"
+                f"give a band of the quantity of at most {float(f'{0.9 * band * most / rings:.1e}'):g} Hz"
             )
         with stages("modes"):
             size = asked.pieces.get("size") or vectors.size_for(target, 0.5 / asked.duration, asked.budget.total)
@@ -67,11 +66,10 @@ class Vectors(Description):
         smallest = refinement.smallest_size(target.element, target.mesh)
         if size < smallest and not asked.meshed:
             soft = blow.contact.stiffness * (size / smallest) ** (2.0 * (blow.contact.exponent + 1.0))
-            needs = refinement.unknowns(target.element, target.mesh, size)
+            needs, soft = refinement.unknowns(target.element, target.mesh, size), float(f"{0.9 * soft:.1e}")
             raise Unaffordable(
                 f"this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit of "
-                f"{refinement.MOST_UNKNOWNS}; take a softer striker or contact, with stiffness = "
-                f"{float(f'{0.9 * soft:.1e}'):g}"
+                f"{refinement.MOST_UNKNOWNS}; take a softer striker or contact, with stiffness = {soft:g}"
             )
         wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
         elements = vectors.elements_for(target, size, asked.mass, *wanted)
@@ -91,8 +89,8 @@ class Vectors(Description):
             grown, finest = rattling, max(*unknowns, RESOLVING * rattling)
             unknowns = [finest, max(unknowns[0], round(finest / refinement.COARSER**2))]
         work = cost.by_vectors(unknowns, grown)
-        of_modes = FIRST_LOOK, ringing_count(asked)
-        ringing = sum((ringing_work(target.element, n, asked.close) for n in of_modes), cost.NOTHING)
+        ringing = ringing_work(target.element, FIRST_LOOK, asked.close)
+        ringing += ringing_work(target.element, ringing_count(asked), asked.close)
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
         reason = f"{target.element} elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"

@@ -268,6 +268,15 @@ def _cut_off(force: np.ndarray, response: np.ndarray, stated: Any) -> np.ndarray
     return np.broadcast_to(flags, shape).copy()
 
 
+def _rate_of(found: readers.Recording, name: str) -> float:
+    """Sampling rate [Hz] that a recording states."""
+    if found.rate is None:
+        raise ValueError(f"rate must be given: {name} does not state the sampling rate")
+    if not RATES[0] <= found.rate <= RATES[1]:
+        raise ValueError(f"{name} states a rate of {found.rate:g} Hz; check the unit of its times, or give rate=")
+    return found.rate
+
+
 def read_taps(
     path: Any,
     *,
@@ -334,11 +343,7 @@ def read_taps(
     """
     found = readers.read(path)
     name = check.path("path", path).name
-    stated = found.rate if rate is None else check.between("rate", rate, *RATES, "Hz")
-    if stated is not None and not RATES[0] <= stated <= RATES[1]:
-        raise ValueError(f"{name} states a rate of {stated:g} Hz; check the unit of its times, or give rate=")
-    if stated is None:
-        raise ValueError(f"rate must be given: {name} does not state the sampling rate")
+    stated = _rate_of(found, name) if rate is None else check.between("rate", rate, *RATES, "Hz")
     notes = list(found.notes)
     if found.rate is not None and abs(found.rate / stated - 1.0) > 1e-3:
         notes.append(f"the file states {found.rate:g} Hz; rate={stated:g} Hz was used")
