@@ -167,7 +167,7 @@ class Strokes(Totals, check.Locked):
             wanted = words(hit.quantities)
             return f"tolerance {self.tolerance:g} met by all: estimated error {self.error:.1e} of {wanted}"
         strokes = " and ".join(str(i) for i in self.strikers[worst])
-        return f"stroke {strokes} at {self.starts[worst]:.4g} s: {hit.promise}"
+        return f"stroke {strokes} at {self.starts[worst]:.4g} s: {hit.promise}{_instead(hit.promise)}"
 
     @property
     def hardest(self) -> int:
@@ -228,6 +228,11 @@ class Strokes(Totals, check.Locked):
             f"after the last blow: {self.hits[-1].outcome}",
         ]
         return "\n".join([*lines, *lines_of_notes(self.notes)])
+
+
+def _instead(said: object) -> str:
+    """What to give to a stroke instead of a number of impacts, if words about a blow advise that."""
+    return "; to a stroke, give a short lasts instead" if "max_impacts" in str(said) else ""
 
 
 @dataclass(eq=False)
@@ -361,7 +366,9 @@ class _Game:
             try:
                 hit = self._blow(fresh, {**rule, **limit}) if lifts else self._alone()
             except SimulationError as problem:
-                raise SimulationError(f"stroke {' and '.join(map(str, on))} at {self.now:.4g} s: {problem}") from None
+                raise SimulationError(
+                    f"stroke {' and '.join(map(str, on))} at {self.now:.4g} s: {problem}{_instead(problem)}"
+                ) from None
             who = tuple(stick.number for stick in self.sticks)
             LOG.info("stroke %s at %.4g s: %d impacts", " and ".join(map(str, who)) or "none", self.now, hit.n_impacts)
             self.starts.append(self.now)

@@ -130,13 +130,9 @@ def _quick_map(
     stages, residual = Stages(wanted.get("stage")), scene.blow.values.get("residual", True)
     given = {name: value for name, value in wanted.items() if name != "stage"}
     job = grid.Job(tolerance, band, residual=residual, audit=True, **given)
-    try:
+    with scene.blame("map"):
         case, axes = job.described(scene.built, over, stages)
-    except check.SimulationError as error:
-        raise check.SimulationError(f"{scene.path}: {error}") from None
-    except ValueError as error:  # of the axes, unless it names the file and another table
-        raise error if str(error).startswith(check.line(str(scene.path))) else scene.fault(f"[map] {error}") from None
-    return with_theory(grid.compute_map(job.cases(case, axes), job), case, axes)
+        return with_theory(grid.compute_map(job.cases(case, axes), job), case, axes)
 
 
 def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:

@@ -33,8 +33,8 @@ from .named import fill_names
 from .whole import check_whole
 
 from .schema import (  # isort: skip
-    MAKERS, NESTED, PARTS, PATHS, REPEATED, REQUIRED, TABLES, Part, scene_error, read_list, read_part, read_strokes,
-    read_tables,
+    MAKERS, NESTED, OF_TARGET, PARTS, PATHS, REPEATED, REQUIRED, TABLES, Part, scene_error, read_list, read_part,
+    read_strokes, read_tables,
 )  # fmt: skip
 
 # [-] places along a beam where its section is looked at: ten in each hundredth of it, where it may change
@@ -144,9 +144,10 @@ class Scene(check.Brief):
             check.tolerance(tolerance)
         number = min(count + 3, most) if elastic else count  # a plate lifts and turns about two axes
         first = None
-        if keep is not None and target.kind == "fe" and number > FIRST_LOOK:
-            first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
-        found = target.find(number, tolerance=tolerance, first=first, keep=keep)
+        with self.blame("target"):
+            if keep is not None and target.kind == "fe" and number > FIRST_LOOK:
+                first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
+            found = target.find(number, tolerance=tolerance, first=first, keep=keep)
         return target.surrounded(found.truncated(n_modes=count + found.n_rigid) if elastic else found)
 
     @check.typed
@@ -471,14 +472,21 @@ class Scene(check.Brief):
 
     @contextmanager
     def blame(self, table: str, changes: Iterable[str] = ()) -> Iterator[None]:
-        """Put the file and the table in front of an error about a table's numbers, unless ``changes`` set them."""
+        """Put the file and the table in front of an error about a table's numbers, unless ``changes`` set them.
+
+        Of a simulation that failed, the file.
+        """
         called = table if table.startswith("[") else f"[{table}]"
         try:
             yield
-        except ValueError as error:
-            if str(error).partition(" ")[0] in changes:
+        except (ValueError, check.SimulationError) as error:
+            said, name = str(error), f"{check.line(str(self.path))}: "
+            key = said.partition(" ")[0].partition("=")[0]
+            if said.startswith(name) or key in changes:
                 raise
-            raise self.fault(f"{called} {error}") from None
+            if isinstance(error, check.SimulationError):
+                raise type(error)(name + said) from None
+            raise self.fault(f"{'[target]' if key in OF_TARGET else called} {said}") from None
         except (OverflowError, ZeroDivisionError):
             raise self.fault(f"{called} has a number too large or too small; check its units") from None
 

@@ -88,14 +88,18 @@ def for_many(
     """
     scene.check_single()
     scene.check_unpushed()
+    notes: tuple[str, ...] = ()
+    if scene.blow.values.get("quantity"):
+        notes = ("quantity of [strike] is of the single blow; here the tolerance holds for the numbers of each blow",)
     if scene.target.values.get("model") != "auto":
-        return scene, ()
+        return scene, notes
     changes: dict[str, Any] = {} if tolerance is None else {"tolerance": tolerance}
     found = scene.run(watch, **changes).plan.blow.target
     chosen = {name: value for name in ("theory", "air", "stretching") if (value := getattr(found, name))}
     said = ", ".join(f"{name} = {value}" for name, value in chosen.items()) or "nothing beyond what is stated"
     target = Part(scene.target.kind, {**scene.target.values, **chosen, "model": "stated"})
-    return replace(scene, target=target), (f"the model of the target is what the scene's own blow requires: {said}",)
+    notes += (f"the model of the target is what the scene's own blow requires: {said}",)
+    return replace(scene, target=target), notes
 
 
 def is_tied(scene: "Scene", name: str) -> bool:

@@ -289,3 +289,10 @@ def test_a_stroke_without_end_says_which_it_is(monkeypatch):
     monkeypatch.setattr("fem_impact.impact.engine.MAX_STEPS", 5)
     with pytest.raises(fi.SimulationError, match=r"stroke 0 at 0 s: no final separation was reached in 5 steps"):
         fi.strokes(DRUM, [STROKE], **LOOSE)
+
+
+def test_a_stroke_is_not_told_to_end_with_an_impact_as_only_a_single_blow_can():
+    played = fi.strokes(DRUM, [STROKE], **LOOSE)
+    hits = [replace(hit, error=replace(hit.error, mesh=1.0)) for hit in played.hits]
+    said = replace(played, hits=tuple(hits)).promise
+    assert said.endswith("give max_impacts = 1 for the first impact alone; to a stroke, give a short lasts instead")

@@ -5,6 +5,7 @@ import os
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from scenes import BAR, QUICK, SHIPPED, edited, load_text
 
 import fem_impact as fi
 from fem_impact.fe import refinement
+from fem_impact.model.target import Target
 from fem_impact.modes import ritz
 from fem_impact.scenes import maps
 from fem_impact.scenes.scene import scene_of
@@ -40,6 +42,27 @@ def table(scene):
 def test_cells_of_a_scene_map_are_struck_scenes(scene, table):
     changed = maps.changed_scene(maps.changed_scene(scene, "contact.stiffness", 1e5), "striker.mass", 0.02)
     assert worst(table.sel(stiffness=1e5, mass=0.02), changed.strike()) < 2e-3  # 1e-3 each
+
+
+def test_a_map_says_that_it_does_not_follow_the_quantity_of_the_single_blow(tmp_path):
+    scene = load_text(tmp_path, QUICK.replace("tolerance = 1e-2", 'tolerance = 1e-2\nquantity = "spectrum=5000"'))
+    assert "quantity of [strike] is of the single blow" in maps.map_scene(scene).attrs["notes"]
+
+
+def test_what_fails_in_a_scene_names_its_file_once(tmp_path, monkeypatch):
+    """Of a key of [target] that the strike gets, that table; of a simulation that fails, the file alone."""
+    stretched = load_text(tmp_path, QUICK.replace("[target]", "[target]\nstretching = true"))
+    for run in (stretched.strike, partial(maps.map_scene, stretched)):
+        with pytest.raises(ValueError, match=rf"^{re.escape(str(stretched.path))}: \[target\] stretching=True works"):
+            run()
+
+    def fail(*_, **__):
+        raise fi.SimulationError("no mesh is fine enough")
+
+    monkeypatch.setattr(Target, "find", fail)
+    for run in (partial(stretched.modes, 5), partial(maps.map_scene, stretched), stretched.plan):
+        with pytest.raises(fi.SimulationError, match=rf"^{re.escape(str(stretched.path))}: no mesh is fine enough$"):
+            run()
 
 
 def test_theory_stands_beside_the_blows(table):
