@@ -23,6 +23,7 @@ of hinged rectangles); Christian, Davis, Tubis, Anderson, Mills and Rossing (198
 (drumheads, whose low frequencies the air sets).
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -46,6 +47,9 @@ SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, fine 
 GAIN = (SAMPLES[1] / SAMPLES[0]) ** 2 - 1.0  # [-] fact: the coarse error less the fine one, over the fine one
 # [-] modes solved at the same few frequencies, and modes beside it that air may mix in: far ones swing too differently
 BLOCK = 24
+# [-] waves in a plate over those of sound, as long as which modes are not solved for, and how much of the damping by
+# plane waves the last ones solved for may be off that
+PLANE = 2.0, 0.3
 
 
 @check.typed
@@ -75,7 +79,8 @@ def in_air(
     -------
     Modes
         With `frequency_error` from a second grid of cells, with which frequencies are extrapolated, and from the area
-        that the grids miss at the rim; with `damping_error` in the same way. Rigid motions and damping ratios given
+        that the grids miss at the rim; with `damping_error` in the same way. Modes that outrun sound by far radiate
+        like plane waves; their errors are how far the slowest of them are from that. Rigid motions and damping ratios given
         before stay; that the added mass changes with frequency is kept in the frequencies, not in the amplitudes.
 
     Examples
@@ -94,30 +99,12 @@ def in_air(
         return modes
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
-    share, spacing = 1.0 if baffled else 0.5, _spacing(modes, float(modes.shapes.quadrature(0.0)[1].sum()), speed)
-    points, sizes = modes.shapes.quadrature(2.0 * np.pi / (PER_WAVE * SAMPLES[0] * spacing))
-    whole = points, sizes, modes.shapes.at(points)
-    samples, missed = _sampled(modes.shapes, spacing, whole)
-    weight = density * sides * share / (2.0 * np.pi)
-    found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
-    (omega, own), (lower, mixed) = found.solved(), other.solved()
-    shift = lower / omega - 1.0
-    rarer = SAMPLES[1] / SAMPLES[0] * spacing
-    few = _strengths(_sampled(modes.shapes, rarer, whole)[0], rarer, SAMPLES[0])
-    sparse = _Air(modes, few, other.size, weight, speed)
-    radiated, unsure = _extrapolated(
-        found.damping(own, omega), sparse.damping(own, omega), other.damping(mixed, lower), missed[modes.n_rigid :]
-    )
-    better = 1.0 - shift / GAIN  # the error of square cells shrinks with their area
-    # the nearest mixtures (n, n) that together give the static deflections of the old modes
-    stiff = modes.omega[modes.n_rigid :, None] / omega
-    turned, _, back = np.linalg.svd(own * stiff, full_matrices=False)
-    mix = (turned @ back) / modes.omega[modes.n_rigid :, None] * omega * better
-    omega *= better
-    # the two grids agree by chance where the shift changes its sign, so that no mode is surer than those below it
+    share, solved, count = 1.0 if baffled else 0.5, None, _count_slow(modes, speed)
+    while solved is None:
+        solved = _solved(modes, count, density * sides * share / (2.0 * np.pi), speed)
+        count = min(2 * count, modes.n_modes)
+    omega, mix, doubt, radiated, unsure = solved
     heavier = modes.omega[modes.n_rigid :] / omega - 1.0
-    doubt = 1.5 * (np.maximum.accumulate(np.abs(shift)) + missed[modes.n_rigid :] * np.abs(heavier))
-    unsure = unsure + _mistaken(found, mix, omega, doubt)  # of a pair at one frequency both of `own` may be one
     side = "both sides" if sides == 2 else "one side"
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
     if not baffled:
@@ -132,14 +119,72 @@ def in_air(
             doubt, unsure = np.maximum(doubt, np.abs(bare - 1.0)), np.maximum(unsure, lost)
         note = f"air of {density:g} kg/m^3 on {side} adds half the mass that it would with a rigid wall around"
     order = np.argsort(omega, kind="stable")
-    whole = block_diag(np.eye(modes.n_rigid), mix[:, order])
+    mix = block_diag(np.eye(modes.n_rigid), mix[:, order])
     rest = np.zeros(modes.n_rigid)
     omega, radiated, doubt, unsure = (np.append(rest, each[order]) for each in (omega, radiated, doubt, unsure))
     before = 0.0 if modes.frequency_error is None else modes.frequency_error
     return Modes(
-        omega, modes.damping_ratio + radiated, ScaledShapes(modes.shapes, mix=whole), modes.mass, before + doubt,
+        omega, modes.damping_ratio + radiated, ScaledShapes(modes.shapes, mix=mix), modes.mass, before + doubt,
         notes=plausible.together(modes.notes, (note,)), poorer=poorer, section=modes.section, thick=modes.thick,
         air=True, damping_error=unsure,
+    )  # fmt: skip
+
+
+def _count_slow(modes: Modes, speed: float) -> int:
+    """How many modes are solved for in air: all but the last, which outrun sound.
+
+    Of those a block, by which the others are judged.
+    """
+    area = float(modes.shapes.quadrature(0.0)[1].sum())
+    number = np.arange(1, modes.n_modes + 1)  # its wavenumber is that of Weyl's law
+    slow = np.flatnonzero(modes.omega < PLANE[0] * speed * np.sqrt(4.0 * np.pi * number / area))
+    count = int(slow[-1]) + 1 + BLOCK if slow.size else 0
+    return min(max(count, modes.n_rigid + 2 * BLOCK), modes.n_modes)
+
+
+def _solved(modes: Modes, count: int, weight: float, speed: float) -> tuple[np.ndarray, ...] | None:
+    """Frequencies [rad/s], mixtures, errors, damping ratios by sound and their errors of the flexible modes in air.
+
+    The first ``count`` are solved for. Those beyond push the air before them as a plane wave, without weight; None if
+    the last ones solved for do not. ``weight`` as of `_Air`.
+    """
+    whole, modes = modes, modes.truncated(n_modes=count)
+    rigid, spacing = modes.n_rigid, _spacing(modes, float(modes.shapes.quadrature(0.0)[1].sum()), speed)
+    points, sizes = modes.shapes.quadrature(2.0 * np.pi / (PER_WAVE * SAMPLES[0] * spacing))
+    known = points, sizes, modes.shapes.at(points)
+    samples, missed = _sampled(modes.shapes, spacing, known)
+    found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
+    (omega, own), (lower, mixed) = found.solved(), other.solved()
+    shift = lower / omega - 1.0
+    rarer = SAMPLES[1] / SAMPLES[0] * spacing
+    few = _strengths(_sampled(modes.shapes, rarer, known)[0], rarer, SAMPLES[0])
+    sparse = _Air(modes, few, other.size, weight, speed)
+    radiated, unsure = _extrapolated(
+        found.damping(own, omega), sparse.damping(own, omega), other.damping(mixed, lower), missed[rigid:]
+    )
+    better = 1.0 - shift / GAIN  # the error of square cells shrinks with their area
+    # the nearest mixtures (n, n) that together give the static deflections of the old modes
+    turned, _, back = np.linalg.svd(own * (modes.omega[rigid:, None] / omega), full_matrices=False)
+    mix = (turned @ back) / modes.omega[rigid:, None] * omega * better
+    omega *= better
+    # the two grids agree by chance where the shift changes its sign, so that no mode is surer than those below it
+    heavier = modes.omega[rigid:] / omega - 1.0
+    doubt = 1.5 * (np.maximum.accumulate(np.abs(shift)) + missed[rigid:] * np.abs(heavier))
+    unsure = unsure + _mistaken(found, mix, omega, doubt)  # of a pair at one frequency both of `own` may be one
+    if count == whole.n_modes:
+        return omega, mix, doubt, radiated, unsure
+    fast = slice(count - BLOCK, None)
+    points, sizes = whole.shapes.quadrature(2.0 * np.sqrt(4.0 * np.pi * whole.n_modes / sizes.sum()))
+    plane = np.pi * weight * speed / whole.omega[fast] * (sizes @ whole.shapes.at(points)[:, fast] ** 2)
+    over = radiated[-BLOCK:] / plane[:BLOCK] - 1.0  # the faster, the less
+    apart, plane = float(np.abs(over).max()), plane[BLOCK:]
+    if apart > PLANE[1]:
+        return None
+    heaviest = doubt[-1] + 2.0 * np.abs(heavier[-BLOCK:]).max()
+    return (
+        np.append(omega, whole.omega[count:]), block_diag(mix, np.eye(len(plane))),
+        np.append(doubt, np.full(len(plane), heaviest)), np.append(radiated, (1.0 + 0.5 * over.mean()) * plane),
+        np.append(unsure, (apart + (unsure / radiated)[-BLOCK:].max()) * plane),
     )  # fmt: skip
 
 
@@ -181,10 +226,10 @@ def _mistaken(air: "_Air", mix: np.ndarray, omega: np.ndarray, doubt: np.ndarray
     ``doubt`` (n,) are the relative errors of the frequencies omega (n,): those of their difference turn two modes.
     """
     order, found = np.argsort(omega, kind="stable"), np.zeros(len(omega))
-    for pair in map(np.array, pairwise(order)):
+    for pair, source in zip(map(np.array, pairwise(order)), air.sources(mix[:, order], 2)):
         gap, apart = float(np.ptp(omega[pair]) / omega[pair[1]]), float(doubt[pair].sum())
         turn = min(1.0, 0.5 * apart / gap) if gap > 0.0 else 1.0
-        lost = air.exchanged(mix[:, pair], float(omega[pair[1]]))
+        lost = air.exchanged(source, float(omega[pair[1]]))
         found[pair] += 2.0 * turn * abs(lost[0, 1]) + turn**2 * abs(lost[0, 0] - lost[1, 1])
     return found
 
@@ -222,16 +267,24 @@ class _Air:
         away = np.divide(1.0, self.distance, out=np.zeros_like(self.distance), where=self.distance > 0.0)
         return self.inverse - 2.0 * away * np.sin(0.5 * omega / self.speed * self.distance) ** 2
 
-    def exchanged(self, shapes: np.ndarray, omega: float) -> np.ndarray:
-        """Damping ratios (n, n) by sound between mixtures (n_flexible, n) of the modes at a frequency [rad/s]."""
+    def sources(self, shapes: np.ndarray, together: int = 1) -> Iterator[np.ndarray]:
+        """Strengths (together, ...) of so many neighbours of mixtures (n_flexible, n) of the modes, one after another.
+
+        Their sums are made for many at once, as each would take all shapes through memory.
+        """
+        for first in range(0, shapes.shape[1] - together + 1, BLOCK):
+            found = np.tensordot(shapes[:, first : first + BLOCK + together - 1].T, self.strength, 1)
+            yield from (found[i : i + together] for i in range(len(found) - together + 1))
+
+    def exchanged(self, source: np.ndarray, omega: float) -> np.ndarray:
+        """Damping ratios (n, n) by sound between sources (n, ...) at a frequency [rad/s]."""
         wave = omega / self.speed
-        strength = np.tensordot(shapes.T, self.strength, 1)
         kernel = wave * np.sinc(wave / np.pi * self.distance)
-        return 0.5 * self.weight * self._product(rfft2(strength, self.padded), kernel)
+        return 0.5 * self.weight * self._product(rfft2(source, self.padded), kernel)
 
     def damping(self, shapes: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Damping ratios (n,) by sound of mixtures (n_flexible, n) of the modes at frequencies (n,) [rad/s]."""
-        return np.array([max(0.0, self.exchanged(shape[:, None], x)[0, 0]) for shape, x in zip(shapes.T, omega)])
+        return np.array([max(0.0, self.exchanged(*each)[0, 0]) for each in zip(self.sources(shapes), omega)])
 
     def _product(self, spectrum: np.ndarray, kernel: np.ndarray) -> np.ndarray:
         """Double integrals (n, n) of pairs of sources of a spectrum (n, ...) with a kernel (padded), which is even."""
@@ -242,16 +295,20 @@ class _Air:
 
     def solved(self) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies [rad/s] of the flexible modes, and their mixture of the old ones (n_flexible, n_flexible) [-]."""
-        count = len(self.old)
+        count, heaviest = len(self.old), 0.1
         omega, vectors = self.old.copy(), np.zeros((count, count))
         for first in range(0, count, BLOCK):
-            block = slice(first, min(first + BLOCK, count))
-            window = slice(max(0, first - BLOCK), min(count, block.stop + BLOCK))
-            low, high = np.inf, 0.0
-            while low > omega[block].min() or high < omega[block].max():
-                # a tenth beyond the block, which its modes seldom leave: a wider band then takes another turn
-                low, high = min(low, 0.9 * omega[block].min()), max(high, 1.1 * omega[block].max())
-                self._solve(block, window, (low, high), omega, vectors)
+            block, solved = slice(first, min(first + BLOCK, count)), False
+            while not solved:  # again if the air is heavier than on the block before, or a mode leaves the band
+                low, high = omega[block].min(), omega[block].max()
+                far = 1e3 * heaviest  # beyond which mixtures of first order err by a millionth
+                near = np.searchsorted(self.old, [low * (1.0 - far), high * (1.0 + far)])
+                ends = (max(0, first - BLOCK), block.stop), (first, min(count, block.stop + BLOCK))
+                window = slice(*np.clip(near, *ends).tolist())
+                low, high = low * (1.0 - min(0.5, 2.0 * heaviest)), high * (1.0 + 2.0 * heaviest)
+                most = self._solve(block, window, (low, high), omega, vectors)
+                solved = most <= 2.0 * heaviest and low <= omega[block].min() and omega[block].max() <= high
+                heaviest = most
             self._mix_in(block, window, omega, vectors)
         return omega, vectors
 
@@ -261,17 +318,22 @@ class _Air:
         The lowest ones radiate so much more that a few percent of them change the damping by a tenth.
         """
         outside = np.r_[: window.start, window.stop : len(self.old)]
-        for i in range(block.start, block.stop) if outside.size else ():
-            source = np.tensordot(vectors[window, i], self.strength[window], 1)[None]
-            kernel = self._pressing(omega[i])
-            field = irfft2(rfft2(source, self.padded) * rfft2(kernel), self.padded)[0]
-            added = self.weight * np.tensordot(self.strength[outside], field[: source.shape[1], : source.shape[2]], 2)
-            vectors[outside, i] = omega[i] ** 2 * added / (self.old[outside] ** 2 - omega[i] ** 2)
+        if outside.size:
+            field = np.tensordot(vectors[window, block].T, self.strength[window], 1)
+            for i, source in enumerate(field):
+                spectrum = rfft2(source, self.padded) * rfft2(self._pressing(omega[block][i]))
+                source[:] = irfft2(spectrum, self.padded)[: source.shape[0], : source.shape[1]]
+            added = self.weight * np.tensordot(self.strength, field, ((1, 2), (1, 2)))[outside]
+            square = omega[block] ** 2
+            vectors[outside, block] = square * added / (self.old[outside, None] ** 2 - square)
 
     def _solve(
         self, block: slice, window: slice, band: tuple[float, float], omega: np.ndarray, vectors: np.ndarray
-    ) -> None:
-        """Solve for the modes of a block with masses known within a band of frequencies [rad/s], in place."""
+    ) -> float:
+        """Solve for the modes of a block with masses known within a band of frequencies [rad/s], in place.
+
+        Returns the largest mass [-] that air adds.
+        """
         middle, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
         # interpolated from n Chebyshev nodes, cos(k R) errs by 4 Bessel functions J_n(k R) and less, k of half the band
         reach = half / self.speed * self.distance.max()
@@ -290,6 +352,7 @@ class _Air:
                     break
             own = vector[:, 0]
             vectors[window, i] = own if own[np.abs(own).argmax()] > 0.0 else -own
+        return float(np.abs(added(nodes[0])).max())
 
 
 def _sampled(

@@ -105,6 +105,29 @@ def test_low_modes_radiate_as_wallace_says(plate):
     assert found == pytest.approx(sigma, rel=0.02)  # Wallace's series has an error of (ka)**4
 
 
+def test_modes_that_outrun_sound_are_damped_as_sums_over_wave_numbers_say():
+    """They are not solved for on a grid, which takes minutes beyond some hundred; Rayleigh's integral of every mode."""
+    a, b, mass = 0.3, 0.21, 0.6
+    plate = fi.analytic.rectangle(a, b, mass=mass, first_frequency=300.0, n_modes=160)
+    loud = fi.in_air(plate)
+    m, n = (x.ravel() for x in np.meshgrid(np.arange(1, 40), np.arange(1, 40), indexing="ij"))
+    order = np.argsort((m / a) ** 2 + (n / b) ** 2)[:160]
+    theta, turn = np.polynomial.legendre.leggauss(150), 2.0 * np.pi * (np.arange(600) + 0.5) / 600
+    sine = np.sin(0.25 * np.pi * (theta[0] + 1.0))
+    solid = 0.25 * np.pi * (theta[1] * sine)[:, None] * np.full(600, 2.0 * np.pi / 600)
+    fast = np.arange(70, 160, 8)
+    for i in fast:
+        k, square = plate.omega[i] / C, 4.0 / mass
+        for number, side, along in ((m[order[i]], a, np.cos(turn)), (n[order[i]], b, np.sin(turn))):
+            own, kappa = number * np.pi / side, k * np.outer(sine, along)
+            square = (
+                square * np.abs(own * (1.0 - (-1.0) ** number * np.exp(-1j * kappa * side)) / (own**2 - kappa**2)) ** 2
+            )
+        damping = 2.0 * RHO * k * (square * solid).sum() / (8.0 * np.pi**2)
+        assert abs(loud.damping_ratio[i] - damping) < loud.damping_error[i] < 0.3 * damping
+    assert (abs(loud.omega[fast] / plate.omega[fast] - 1.0) <= loud.frequency_error[fast]).all()
+
+
 def test_thin_air_changes_nothing_and_one_side_does_half(plate):
     assert fi.in_air(plate, density=1e-9).omega == pytest.approx(plate.omega, rel=1e-8)
     one, two = (1.0 - (fi.in_air(plate, density=0.01, sides=n).omega / plate.omega) ** 2 for n in (1, 2))
