@@ -32,11 +32,14 @@ class Interpolation:
             where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
             raise ValueError(explained.with_headings(f"{name} must lie on the body, got ({where}) m"))
 
-    def rows(self, points: np.ndarray, expand: Any) -> Any:
-        """Matrix (n_points, n_all) from all unknowns to the deflection at points (n_points, dimension) [m]."""
+    def rows(self, points: np.ndarray, expand: Any, spread: bool = True) -> Any:
+        """Matrix (n_points, n_all) from all unknowns to the deflection at points (n_points, dimension) [m].
+
+        If not ``spread``, at the very points, also of a thick plate.
+        """
         local = self.frame.local(points)
         rows = self._exactly(local, expand.shape[0])
-        if not self.theory.patch:
+        if not (spread and self.theory.patch):
             return rows
         radius = self.theory.patch * size_at(self.section, "thickness", points) / self.frame.length
         moves = abs(rows @ expand).max(axis=1).toarray()[:, 0] > ROUNDING

@@ -106,13 +106,13 @@ class System(check.Brief):
         """Whether each point (n_points, dimension) [m] lies on the body, (n_points,) bool."""
         return self.space.locate(self.frame.local(points))[1]
 
-    def interpolate(self, points: np.ndarray) -> Sparse:
+    def interpolate(self, points: np.ndarray, spread: bool = True) -> Sparse:
         """Matrix (n_points, n_dofs) [-] from the unknowns to the deflection at points (n_points, dimension) [m].
 
-        On a thick plate it is the mean over the disk on which a force at the point acts, see `thick`.
+        On a thick plate it is the mean over the disk on which a force at the point acts, see `thick`, if ``spread``.
         """
         rows = Interpolation(self.rules, self.section, self.space, self.frame, self.element_dofs)
-        return rows.rows(points, self.expand) @ self.expand
+        return rows.rows(points, self.expand, spread) @ self.expand
 
 
 def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:

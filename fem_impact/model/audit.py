@@ -3,7 +3,7 @@
 Nothing is examined until somebody asks: a response carries the examiner along (`Response.assumptions`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -94,8 +94,13 @@ def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assump
     return fresh.answer_soon(examined) if short else examined()
 
 
-def required_model(target: Target, hit: Response) -> tuple[Target, str] | None:
-    """The target with the better model that the tolerance of a blow requires, and why; None if it requires none."""
+def required_model(
+    target: Target, hit: Response, without: Collection[str] = (), together: bool = True
+) -> tuple[dict[str, Any], str, list[str]] | None:
+    """Changes of the target to the better model that the tolerance of a blow requires, why, and for which assumptions.
+
+    None if it requires none. Assumptions ``without`` a better model stay; if not ``together``, all but the first do.
+    """
     if target.mesh is None:
         return None
     plate, theory = target.mesh.dimension == 2, THEORIES[target.mesh.dimension][1]
@@ -110,12 +115,15 @@ def required_model(target: Target, hit: Response) -> tuple[Target, str] | None:
             target.can_stretch and not target.stretching, {"stretching": True}, "stiffens as it stretches",
         ),
     }  # fmt: skip
-    for each in hit.assumptions:
-        can, changes, does = better.get(each.name, (False, {}, ""))
-        if can and each.worst > hit.tolerance:
-            why = f"the target now {does}, which changes the {each.change()} ({each.reading})"
-            return replace(target, **changes), why
-    return None
+    wrong = [
+        each for each in hit.assumptions
+        if each.name not in without and better.get(each.name, (False,))[0] and each.worst > hit.tolerance
+    ][: None if together else 1]  # fmt: skip
+    if not wrong:
+        return None
+    does = (f"{better[each.name][2]}, which changes the {each.change()} ({each.reading})" for each in wrong)
+    changes = dict(item for each in wrong for item in better[each.name][1].items())
+    return changes, f"the target now {', and '.join(does)}", [each.name for each in wrong]
 
 
 def examine_plan(

@@ -37,12 +37,13 @@ class Modal(Description):
 
     rings = True
     banded: bool  # whether a band of the quantities asks for more modes than the blow
-    more: float = 1.0  # [-] times as many modes as the blow needs: these give the air around it cells
+    finer: float = 1.0  # [-] times as small cells of the air around it, as in `in_air`
+    bare: Modes | None = None  # in a vacuum, once they are found
     attempt: int = 1
 
     @classmethod
     def of(
-        cls, asked: Asked, stages: Stages, first: Modes | None = None, more: float = 1.0, attempt: int = 1
+        cls, asked: Asked, stages: Stages, first: Modes | None = None, finer: float = 1.0, attempt: int = 1
     ) -> "Modal":
         """The target with as many modes as the blow needs; finds the first ones, because they show how many."""
         target, at, mass = asked.blow.target, asked.values["at"], asked.mass
@@ -64,7 +65,6 @@ class Modal(Description):
             limit = asked.pieces.get("max_frequency", limit)
             # the first modes are kept even if fewer are enough
             number = max(modes.n_modes, round(target.number_below(modes, limit)))
-            limit, number = limit * more ** (2.0 / max(1, modes.dimension)), round(number * more)
         else:
             beyond = max(1.0, number / modes.n_modes) ** (2.0 / modes.dimension)
             limit = modes.frequencies[min(number, modes.n_modes) - 1] * beyond
@@ -92,46 +92,49 @@ class Modal(Description):
         )  # fmt: skip
         if isinstance(first.shapes, FieldShapes):
             forecast = _with_mesh(asked, forecast, first.shapes, limit * first.frequencies[-1] / modes.frequencies[-1])
-        return cls(asked, forecast, band > needed, more, attempt)
+        return cls(asked, forecast, band > needed, finer, attempt=attempt)
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Modal, Modes]":
         """The same, and its modes; ``keep`` is a file that stores those of a costly plan."""
-        forecast, asked, target = self.forecast, self.asked, self.asked.blow.target
+        with stages("modes"):
+            bare = self._found_bare(stages, keep) if self.bare is None else self.bare
+            modes = self.asked.blow.target.surrounded(bare, self.finer)
+        return replace(self, forecast=replace(self.forecast, n_modes=modes.n_modes), bare=bare), modes
+
+    def _found_bare(self, stages: Stages, keep: Any) -> Modes:
+        """The modes in a vacuum, before `Target.finished`."""
+        forecast, asked = self.forecast, self.asked
         keep = keep if forecast.costly and forecast.n_dofs else None
         assert forecast.first is not None and forecast.max_frequency is not None
-        with stages("modes"):
-            first, modes, number = forecast.first, forecast.first, asked.pieces.get("n_modes")
-            ratio = target.finished(first).frequencies[-1] / first.frequencies[-1]
-            if number is not None and number > first.n_modes:
-                modes = asked.find(number, first=first, stages=stages, keep=keep)
-            elif forecast.max_frequency > ratio * first.frequencies[-1] * (1.0 + 1e-9):
-                modes = asked.find(FIRST_LOOK, forecast.max_frequency / ratio, first=first, stages=stages, keep=keep)
-            if number is not None:
-                modes = modes.truncated(n_modes=number)
-            elif "max_frequency" in asked.pieces:
-                modes = modes.truncated(max_frequency=forecast.max_frequency / ratio)
-            modes = target.surrounded(modes)
-        return replace(self, forecast=replace(forecast, n_modes=modes.n_modes)), modes
+        first, modes, number = forecast.first, forecast.first, asked.pieces.get("n_modes")
+        ratio = asked.blow.target.finished(first).frequencies[-1] / first.frequencies[-1]
+        if number is not None and number > first.n_modes:
+            modes = asked.find(number, first=first, stages=stages, keep=keep)
+        elif forecast.max_frequency > ratio * first.frequencies[-1] * (1.0 + 1e-9):
+            modes = asked.find(FIRST_LOOK, forecast.max_frequency / ratio, first=first, stages=stages, keep=keep)
+        if number is not None:
+            return modes.truncated(n_modes=number)
+        stated = "max_frequency" in asked.pieces
+        return modes.truncated(max_frequency=forecast.max_frequency / ratio) if stated else modes
 
     def refined(self, hit: Response, stages: Stages) -> "Modal | None":
-        """More modes if those left out turn out to matter, more for the air's sake, or a finer mesh; twice at most."""
+        """More modes if those left out turn out to matter, finer cells of the air, or a finer mesh; twice at most."""
         asked, budget, error = self.asked, self.asked.budget, hit.error
         if self.attempt == 3 or asked.counted or not asked.values["residual"]:
             return None
         target, missed = asked.blow.target, budget.missed(error, not asked.values["dt"])
-        short = error.truncation > budget.half
-        meshed = target.kind != "fe" or asked.meshed
+        short, finer = error.truncation > budget.half, self.finer
+        left = vectors.MET * (budget.total - (error.total - error.mesh))
+        if missed and target.air and target.baffle and 0.0 < left < error.mesh:
+            finer *= min(4.0, (error.mesh / left) ** 0.5)  # the error of air goes as the area of its cells
+        meshed = target.kind != "fe" or asked.meshed or (self.finer == 1.0 < finer)  # cells cost less: they come first
         coarse = missed and not meshed and error.mesh > budget.cheap
-        more = 1.0
-        if missed and target.air:  # its error goes as the area of cells, whose number goes as that of the modes
-            left = vectors.MET * (budget.total - (error.total - error.mesh))
-            more = max(1.0, error.mesh / left) if left > 0.0 else 1.0
-        if not (short or coarse or more > 1.0):
-            return None
+        if not (short or coarse):
+            return replace(self, finer=finer, attempt=self.attempt + 1) if finer > self.finer else None
         margin, fineness = (NOTCH if more_exact else 1.0 for more_exact in (short, coarse))
         budget = replace(budget, margin=budget.margin * margin, fineness=budget.fineness * fineness)
         first = None if coarse else self.forecast.first
-        better = Modal.of(replace(asked, budget=budget), stages, first, self.more * more, self.attempt + 1)
+        better = Modal.of(replace(asked, budget=budget), stages, first, finer, self.attempt + 1)
         progress.revise(better.forecast.seconds)
         return better
 

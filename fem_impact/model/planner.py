@@ -190,7 +190,16 @@ def make_plan(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = Asked.checked(blow, changes)
     with _note_slips(partial(slips_of, asked), blow.name):
-        return _planned(choose(asked, stages))
+        plan = _planned(choose(asked, stages))
+    if not _chooses(plan):
+        return plan
+    more = "the blow tells whether shear, air or stretching must be taken in, at a cost that is not predicted here"
+    return replace(plan, reasons=(*plan.reasons, f"model = 'auto': {more}"))
+
+
+def _chooses(plan: Plan) -> bool:
+    """Whether the model of the target may become a better one."""
+    return plan.changes.get("model", plan.blow.target.model) == "auto"
 
 
 def slips_of(asked: Asked) -> tuple[str, ...]:
@@ -243,18 +252,23 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
     with _note_slips(partial(slips_of, plan.description.asked), plan.blow.name):
         run = strike_as_planned(plan, stages, keep)
-    chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
     added: tuple[str, ...] = ()
-    while chooses and (better := audit.required_model(plan.blow.target, run.response)) is not None:
-        target, why = better
+    refused: tuple[str, ...] = ()
+    together = True
+    while _chooses(plan) and (better := audit.required_model(plan.blow.target, run.response, refused, together)):
+        changes, why, names = better
         before = sum(stages.seconds.values())
         try:
-            plan = make_plan(replace(plan.blow, target=target), plan.changes, stages)
-            progress.revise(plan.seconds)
-            again = strike_as_planned(plan, stages, None)
+            again = make_plan(replace(plan.blow, target=replace(plan.blow.target, **changes)), plan.changes, stages)
+            progress.revise(again.seconds)
+            run = strike_as_planned(again, stages, None)
         except (check.SimulationError, ValueError, MemoryError) as error:
-            return replace(run, notes=(*added, *run.notes, f"{why}; that was not computed: {error}"))
-        added, run = (*added, f"{why}; that took {sum(stages.seconds.values()) - before:.1g} s more"), again
+            if len(names) > 1:
+                together = False
+            else:
+                added, refused = (*added, f"{why}; that was not computed: {error}"), (*refused, *names)
+            continue
+        plan, added = again, (*added, f"{why}; that took {sum(stages.seconds.values()) - before:.1g} s more")
     return replace(run, notes=(*added, *run.notes))
 
 

@@ -205,12 +205,12 @@ class Target:
         """The modes scaled and damped."""
         return self.damped(modes.scaled(**self.scale) if self.scale else modes)
 
-    def surrounded(self, modes: Modes) -> Modes:
-        """The modes as struck: scaled, damped and in the air around."""
+    def surrounded(self, modes: Modes, finer: float = 1.0) -> Modes:
+        """The modes as struck: scaled, damped and in the air around; ``finer`` as in `in_air`."""
         modes = self.finished(modes)
         if self.air is not None:
             with self.blame("target"):
-                modes = in_air(modes, sides=AIR[self.air], baffled=self.baffle)
+                modes = in_air(modes, sides=AIR[self.air], baffled=self.baffle, finer=finer)
         return replace(modes, stretches=True) if self.stretching else modes
 
     @cached_property

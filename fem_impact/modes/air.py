@@ -40,7 +40,7 @@ from .._base.threads import one_thread
 from ..fe import plausible
 from .free_air import PER_WAVE, between_cells, lattice, loads
 from .modal import Modes
-from .shapes import ScaledShapes, Shapes
+from .shapes import ScaledShapes, Shapes, surface_of
 
 DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C and 1013 hPa
 SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, fine and coarse: both use one set of points
@@ -55,8 +55,9 @@ PLANE = 2.0, 0.3
 @check.typed
 @one_thread
 def in_air(
-    modes: Modes, *, density: float = DENSITY, speed: float = SPEED, sides: int = 2, baffled: bool = True
-) -> Modes:
+    modes: Modes, *, density: float = DENSITY, speed: float = SPEED, sides: int = 2, baffled: bool = True,
+    finer: float = 1.0,
+) -> Modes:  # fmt: skip
     """The modes of a plate surrounded by air: lower frequencies, and damping by the sound radiated.
 
     Parameters
@@ -74,14 +75,17 @@ def in_air(
         added mass is taken and no damping is added: the shift and the damping with the wall become the errors or, where
         they are larger, those of a sheet of dipoles (see `sound.radiate_free`) or, with air on one side, in front of a
         flat box.
+    finer : float [-]
+        How many times smaller the cells of the grid are than usual, as far as 1e8 numbers allow: errors shrink with
+        their area.
 
     Returns
     -------
     Modes
         With `frequency_error` from a second grid of cells, with which frequencies are extrapolated, and from the area
         that the grids miss at the rim; with `damping_error` in the same way. Modes that outrun sound by far radiate
-        like plane waves; their errors are how far the slowest of them are from that. Rigid motions and damping ratios given
-        before stay; that the added mass changes with frequency is kept in the frequencies, not in the amplitudes.
+        like plane waves; their errors are how far the slowest of them are from that. Rigid motions and damping ratios
+        given before stay; that the added mass changes with frequency is kept in the frequencies, not in the amplitudes.
 
     Examples
     --------
@@ -97,11 +101,12 @@ def in_air(
         raise ValueError("in_air needs the modes of a plate whose shapes are known everywhere")
     if modes.n_modes == modes.n_rigid:
         return modes
-    how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
+    finer = check.positive("finer", finer, "-")
+    how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled, "finer": finer}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
     share, solved, count = 1.0 if baffled else 0.5, None, _count_slow(modes, speed)
     while solved is None:
-        solved = _solved(modes, count, density * sides * share / (2.0 * np.pi), speed)
+        solved = _solved(modes, count, density * sides * share / (2.0 * np.pi), speed, finer)
         count = min(2 * count, modes.n_modes)
     omega, mix, doubt, radiated, unsure = solved
     heavier = modes.omega[modes.n_rigid :] / omega - 1.0
@@ -142,16 +147,16 @@ def _count_slow(modes: Modes, speed: float) -> int:
     return min(max(count, modes.n_rigid + 2 * BLOCK), modes.n_modes)
 
 
-def _solved(modes: Modes, count: int, weight: float, speed: float) -> tuple[np.ndarray, ...] | None:
+def _solved(modes: Modes, count: int, weight: float, speed: float, finer: float) -> tuple[np.ndarray, ...] | None:
     """Frequencies [rad/s], mixtures, errors, damping ratios by sound and their errors of the flexible modes in air.
 
     The first ``count`` are solved for. Those beyond push the air before them as a plane wave, without weight; None if
-    the last ones solved for do not. ``weight`` as of `_Air`.
+    the last ones solved for do not. ``weight`` as of `_Air`, ``finer`` as of `in_air`.
     """
     whole, modes = modes, modes.truncated(n_modes=count)
-    rigid, spacing = modes.n_rigid, _spacing(modes, float(modes.shapes.quadrature(0.0)[1].sum()), speed)
+    rigid, spacing = modes.n_rigid, _spacing(modes, float(modes.shapes.quadrature(0.0)[1].sum()), speed, finer)
     points, sizes = modes.shapes.quadrature(2.0 * np.pi / (PER_WAVE * SAMPLES[0] * spacing))
-    known = points, sizes, modes.shapes.at(points)
+    known = points, sizes, surface_of(modes.shapes, points)
     samples, missed = _sampled(modes.shapes, spacing, known)
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
     (omega, own), (lower, mixed) = found.solved(), other.solved()
@@ -175,7 +180,7 @@ def _solved(modes: Modes, count: int, weight: float, speed: float) -> tuple[np.n
         return omega, mix, doubt, radiated, unsure
     fast = slice(count - BLOCK, None)
     points, sizes = whole.shapes.quadrature(2.0 * np.sqrt(4.0 * np.pi * whole.n_modes / sizes.sum()))
-    plane = np.pi * weight * speed / whole.omega[fast] * (sizes @ whole.shapes.at(points)[:, fast] ** 2)
+    plane = np.pi * weight * speed / whole.omega[fast] * (sizes @ surface_of(whole.shapes, points)[:, fast] ** 2)
     over = radiated[-BLOCK:] / plane[:BLOCK] - 1.0  # the faster, the less
     apart, plane = float(np.abs(over).max()), plane[BLOCK:]
     if apart > PLANE[1]:
@@ -188,7 +193,7 @@ def _solved(modes: Modes, count: int, weight: float, speed: float) -> tuple[np.n
     )  # fmt: skip
 
 
-def _spacing(modes: Modes, area: float, speed: float) -> float:
+def _spacing(modes: Modes, area: float, speed: float, finer: float) -> float:
     """Distance [m] of the points at which shapes are sampled on a plate of an area [m^2].
 
     At least 24 cells lie across a square as large as the plate: those at the rim then cover a sixth of it.
@@ -196,13 +201,14 @@ def _spacing(modes: Modes, area: float, speed: float) -> float:
     # [1/m] of the highest mode, by Weyl's law, or of its sound
     wave = max(np.sqrt(4.0 * np.pi * modes.n_modes / area), modes.omega[-1] / speed)
     spacing = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / 24.0) / SAMPLES[0]
-    if not modes.n_modes * area / spacing**2 <= 1e9:  # [-] numbers in memory
+    least = np.sqrt(modes.n_modes * area / 1e9)  # [m] as many numbers fit into memory
+    if not least <= spacing:
         raise ValueError(
             f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
             f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than 1e+09 "
             "numbers; leave air out, or take a larger tolerance or a smaller band"
         )
-    return float(spacing)
+    return float(max(min(spacing, 10.0**0.5 * least), spacing / finer))
 
 
 def _extrapolated(
@@ -371,11 +377,11 @@ def _sampled(
     parts = spacing * (0.25 * np.arange(4) - 0.375)
     pieces = (places[rim][:, None] + np.stack(np.meshgrid(parts, parts), axis=-1).reshape(-1, 2)).reshape(-1, 2)
     covered = shapes.contains(pieces)
-    at_rim = shapes.at(pieces[covered])
+    at_rim = surface_of(shapes, pieces[covered])
     values = np.zeros((len(pieces), at_rim.shape[1]))
     values[covered] = at_rim
     samples = np.zeros((at_rim.shape[1], *inside.shape))
-    samples[:, inside & ~rim] = shapes.at(places[inside & ~rim]).T
+    samples[:, inside & ~rim] = surface_of(shapes, places[inside & ~rim]).T
     samples[:, rim] = values.reshape(rim.sum(), 16, -1).mean(axis=1).T
     share = inside.astype(float)
     share[rim] = covered.reshape(-1, 16).mean(axis=1)

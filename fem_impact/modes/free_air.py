@@ -31,7 +31,7 @@ from .._base.check import SimulationError
 from .._base.rounding import EPSILON
 from ..mesh.meshes import sizes
 from .modal import Modes
-from .shapes import Shapes
+from .shapes import Shapes, surface_of
 
 LOG = logging.getLogger(__name__)
 # [-] cells per wavelength of the highest mode, and of its sound; in `air`, two sizes are extrapolated
@@ -118,7 +118,7 @@ def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[tuple[Jump
 def _solved(modes: Modes, some: np.ndarray, size: float, speed: float) -> Jumps:
     """The jumps of some modes (n,), in ascending order, on cells of a size [m]."""
     points, inside = lattice(modes.shapes, size)
-    shapes = modes.shapes.take(int(some[-1]) + 1).at(points[inside])[:, some]
+    shapes = surface_of(modes.shapes.take(int(some[-1]) + 1), points[inside])[:, some]
     core = binary_erosion(inside)
     sheets = AirSheet(core, size), AirSheet(inside, size)
     solved = [
@@ -146,7 +146,7 @@ def loads(modes: Modes, speed: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _pressed(modes: Modes, part: Jumps) -> tuple[np.ndarray, np.ndarray]:
     """What `loads` finds by the mean of the lattices, and half their difference, (n, 2) each."""
-    shapes = modes.shapes.take(int(part.modes[-1]) + 1).at(part.points)[:, part.modes]
+    shapes = surface_of(modes.shapes.take(int(part.modes[-1]) + 1), part.points)[:, part.modes]
     both = [part.size**2 * (shapes * jump).sum(axis=0) for jump in (part.mean, 0.5 * (part.outer - part.inner))]
     mean, apart = (np.column_stack([each.real, 0.5 * each.imag]) for each in both)
     return mean, apart

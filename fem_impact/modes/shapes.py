@@ -165,6 +165,18 @@ def unwrap_shapes(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
     return shapes, amplitude, mix
 
 
+def surface_of(shapes: Shapes, points: np.ndarray) -> np.ndarray:
+    """How the surface moves at points (n_points, dimension) [m], (n_points, n_modes) [kg**-0.5].
+
+    `Shapes.at`, of thick plates, is what a force there feels: the mean over the disk on which it acts.
+    """
+    base, amplitude, mix = unwrap_shapes(shapes)
+    if not isinstance(base, FieldShapes):
+        return shapes.at(points)
+    found = amplitude * base._shapes(points, spread=False)
+    return found if mix is None else found @ mix
+
+
 @dataclass(frozen=True, eq=False)
 class RigidShapes(Shapes):
     """A rigid mass that can only translate: one mode of frequency zero, with the same shape everywhere."""
@@ -316,8 +328,9 @@ class FieldShapes(ElementShapes, check.Locked):
         shapes.flags.writeable = False
         return shapes
 
-    def _shapes(self, points: np.ndarray) -> np.ndarray:
-        return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
+    def _shapes(self, points: np.ndarray, spread: bool = True) -> np.ndarray:
+        """`at`, if not ``spread`` of the surface, see `surface_of`."""
+        return self.system.interpolate(points, spread) @ self.vectors * self.system.frame.mass**-0.5
 
     def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
         return self._under.recall(loads.tobytes(), lambda: point_load.static_deflection(self.system, loads))

@@ -80,4 +80,4 @@ def test_advice_on_bodies_without_thick_theory_is_not_to_take_it():
         assert curved or "ribs and layers move in the plane" in steep.sentence
         target = Target.of(system)
         better = audit.required_model(target, replace(hit, tolerance=1e-9))
-        assert better is not None and better[0].theory == target.theory  # air or stretching are next
+        assert better is not None and "theory" not in better[0]  # air or stretching are next

@@ -30,7 +30,8 @@ def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
     assert cured.trusted and round(cured.restitution, 2) == 0.64
     chosen = fi.load_scene(SHIPPED / SHOWN).run(model="auto")
     assert chosen.response.restitution == pytest.approx(cured.restitution, abs=1e-9)
-    assert sum("that took" in note for note in chosen.notes) == 2
+    (note,) = (note for note in chosen.notes if "that took" in note)
+    assert "stiffens as it stretches" in note and "moves the air" in note  # both at once
 
 
 UNTRUSTED = (
