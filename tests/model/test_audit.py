@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact.impact import assumption, engine
@@ -295,6 +296,14 @@ def test_a_better_model_that_cannot_be_had_does_not_keep_another_away(tmp_path, 
     assert run.plan.blow.target.stretching and not run.plan.blow.target.air
     assert [note for note in run.notes if note.endswith("; that was not computed: too thin an air")]
     assert [note for note in run.notes if "stiffens as it stretches" in note and "that took" in note]
+
+
+@pytest.mark.slow
+def test_a_closed_form_that_cannot_be_thick_still_moves_air_and_stretches():
+    run = fi.load_scene(SHIPPED / "drumstick_map.toml").run(model="auto")
+    target = run.plan.blow.target
+    assert target.air and target.stretching and target.theory is None
+    assert [note for note in run.notes if "that was not computed: source = 'analytic' covers" in note]
 
 
 def test_stretching_belongs_to_the_target_of_a_scene(tmp_path):
