@@ -283,6 +283,10 @@ class Description(ABC):
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Description, Modes]":
         """The description as it is struck, and its modes; ``keep`` is a file that stores those of a costly plan."""
 
+    def after(self, other: "Description") -> "Description":
+        """The same, with what was found for a blow on another model of the body, as far as that serves."""
+        return self
+
     def refined(self, hit: Response, stages: Stages) -> "Description | None":
         """The next better one that the errors of a blow require; None if they do not, or there is none."""
         return None

@@ -101,6 +101,13 @@ class Modal(Description):
             modes = self.asked.blow.target.surrounded(bare, self.finer)
         return replace(self, forecast=replace(self.forecast, n_modes=modes.n_modes), bare=bare), modes
 
+    def after(self, other: Description) -> "Modal":
+        own = self.forecast
+        if not isinstance(other, Modal) or other.bare is None or other.forecast.first is not own.first:
+            return self
+        enough = own.max_frequency is not None and own.max_frequency <= (other.forecast.max_frequency or 0.0)
+        return replace(self, bare=other.bare) if enough else self
+
     def _found_bare(self, stages: Stages, keep: Any) -> Modes:
         """The modes in a vacuum, before `Target.finished`."""
         forecast, asked = self.forecast, self.asked

@@ -259,8 +259,9 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
         changes, why, names = better
         before = sum(stages.seconds.values())
         try:
-            again = make_plan(replace(plan.blow, target=replace(plan.blow.target, **changes)), plan.changes, stages)
+            again = make_plan(replace(plan.blow, target=plan.blow.target.changed(**changes)), plan.changes, stages)
             progress.revise(again.seconds)
+            again = replace(again, description=again.description.after(run.plan.description))
             run = strike_as_planned(again, stages, None)
         except (check.SimulationError, ValueError, MemoryError) as error:
             if len(names) > 1:

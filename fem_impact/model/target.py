@@ -139,6 +139,13 @@ class Target:
         held, masses = body.supports, body.point_masses
         return cls(body.mesh, body.section, held, masses, posts, {}, damping_ratio, "fe", body.theory, body)
 
+    def changed(self, **changes: Any) -> "Target":
+        """The same body by another model, which has the first modes that are known, unless its theory is another."""
+        better = replace(self, **changes)
+        if "theory" not in changes:
+            check.settle(better, _known=self._known)
+        return better
+
     @cached_property
     def closed(self) -> Callable[..., Modes] | None:
         """Closed formulas for this body, see `analytic.closed_form`; None if there are none."""

@@ -2,6 +2,7 @@
 
 from functools import partial
 from pathlib import Path
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -177,6 +178,18 @@ def test_the_air_gets_smaller_cells_each_time_it_errs_too_much():
     assert (first.finer, second.finer) == (1.0, pytest.approx((2.0 / 0.9) ** 0.5))
     assert third.finer == pytest.approx(second.finer * (1.2 / 0.9) ** 0.5)
     assert after(modal(air="both sides", baffle=False), mesh=2e-2) is None  # whose error is that of the model
+
+
+def test_another_model_of_a_body_has_the_modes_that_were_found():
+    found, _ = modal().found(Stages())
+    blow = found.asked.blow
+
+    def with_model(**changes):
+        other = replace(blow, target=blow.target.changed(**changes)).plan(tolerance=1e-2, target="modal").description
+        return other.after(found).bare
+
+    assert with_model(air="both sides") is with_model(stretching=True) is found.bare
+    assert with_model(theory="mindlin") is None
 
 
 def test_three_attempts_are_enough():
