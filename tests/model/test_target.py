@@ -1,8 +1,8 @@
 """Bodies that a user has assembled are planned and struck like scenes, whatever they are made of."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
