@@ -139,9 +139,10 @@ def assemble(
             )
     else:
         named = check.one_of("theory", usual.name if theory is None else theory, THEORIES[mesh.dimension])
-        if usual is SHALLOW and named != usual.name:
-            why = "a plate that is curved, ribbed or unevenly layered"
-            raise ValueError(f"theory must be {usual.name!r} for {why}, got {named!r}")
+        for argument, only, got in (("theory", usual.name, named), ("element", usual.element, element)):
+            if usual is SHALLOW and got not in (None, only):
+                why = "a plate with rise, ribs or uneven layers"
+                raise ValueError(f"{argument} must be {only!r} for {why}, got {check.shown(got)}")
         known = {each.element: each for each in EVERY if each.name == named}
         rules = known[check.one_of("element", next(iter(known)) if element is None else element, tuple(known))]
     supports = {} if supports is None else supports

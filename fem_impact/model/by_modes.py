@@ -133,7 +133,7 @@ class Modal(Description):
         short, finer = error.truncation > budget.half, self.finer
         left = vectors.MET * (budget.total - (error.total - error.mesh))
         if missed and target.air and target.baffle and 0.0 < left < error.mesh:
-            finer *= min(4.0, (error.mesh / left) ** 0.5)  # the error of air goes as the area of its cells
+            finer = min(4.0, finer * (error.mesh / left) ** 0.5)  # the error of air goes as the area of its cells
         meshed = target.kind != "fe" or asked.meshed or (self.finer == 1.0 < finer)  # cells cost less: they come first
         coarse = missed and not meshed and error.mesh > budget.cheap
         if not (short or coarse):

@@ -76,8 +76,8 @@ def in_air(
         they are larger, those of a sheet of dipoles (see `sound.radiate_free`) or, with air on one side, in front of a
         flat box.
     finer : float [-]
-        How many times smaller the cells of the grid are than usual, as far as 1e8 numbers allow: errors shrink with
-        their area.
+        How many times smaller the cells of the grid are than usual, from 1 to 4, as far as 1e8 numbers allow: errors
+        shrink with their area.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def in_air(
         raise ValueError("in_air needs the modes of a plate whose shapes are known everywhere")
     if modes.n_modes == modes.n_rigid:
         return modes
-    finer = check.positive("finer", finer, "-")
+    finer = check.between("finer", finer, 1.0, 4.0)
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled, "finer": finer}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
     share, solved, count = 1.0 if baffled else 0.5, None, _count_slow(modes, speed)
@@ -311,7 +311,7 @@ class _Air:
                 near = np.searchsorted(self.old, [low * (1.0 - far), high * (1.0 + far)])
                 ends = (max(0, first - BLOCK), block.stop), (first, min(count, block.stop + BLOCK))
                 window = slice(*np.clip(near, *ends).tolist())
-                low, high = low * (1.0 - min(0.5, 2.0 * heaviest)), high * (1.0 + 2.0 * heaviest)
+                low, high = low * (1.0 - min(0.5, 2.0 * heaviest)), high * (1.0 + min(0.1, 2.0 * heaviest))
                 most = self._solve(block, window, (low, high), omega, vectors)
                 solved = most <= 2.0 * heaviest and low <= omega[block].min() and omega[block].max() <= high
                 heaviest = most

@@ -191,6 +191,7 @@ CAP, JUMP = fi.rise.cap(2.0), r"rise must be smoother, or the plate thicker.* ro
 
 test_what_cannot_be_is_refused_by_name_and_at_once = refusing([
     ({"theory": "mindlin", "rise": CAP}, r"theory must be 'shallow' .* got 'mindlin'"),
+    ({"element": "argyris", "rise": CAP}, "element must be 'argyris and quartic' for a plate with rise, ribs"),
     ({"rise": 0.01}, "rise must be a function of points"),
     ({"rise": lambda p: np.zeros(3)}, "rise must be a function that returns numbers of shape"),
     ({"in_plane": {"left": "loose"}}, r"in_plane\['left'\] must be .*held"),
