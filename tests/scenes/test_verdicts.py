@@ -29,7 +29,8 @@ def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
     cured = fi.load_scene(tmp_path / SHOWN).strike()
     assert cured.trusted and round(cured.restitution, 2) == 0.64
     chosen = fi.load_scene(SHIPPED / SHOWN).run(model="auto")
-    assert chosen.response.restitution == pytest.approx(cured.restitution, abs=1e-9)
+    apart = abs(chosen.response.restitution - cured.restitution)  # the modes of the linear blow may be more
+    assert apart <= chosen.response.error.total + cured.error.total
     (note,) = (note for note in chosen.notes if "that took" in note)
     assert "stiffens as it stretches" in note and "moves the air" in note  # both at once
 
