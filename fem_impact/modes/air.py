@@ -314,7 +314,7 @@ class _Air:
                 low, high = low * (1.0 - min(0.5, 2.0 * heaviest)), high * (1.0 + min(0.1, 2.0 * heaviest))
                 most = self._solve(block, window, (low, high), omega, vectors)
                 solved = most <= 2.0 * heaviest and low <= omega[block].min() and omega[block].max() <= high
-                heaviest = most
+                heaviest = max(most, SAME)  # or the band had no width
             self._mix_in(block, window, omega, vectors)
         return omega, vectors
 

@@ -134,6 +134,13 @@ def test_thin_air_changes_nothing_and_one_side_does_half(plate):
     assert two == pytest.approx(2.0 * one, rel=1e-2)  # to first order in the density
 
 
+def test_air_may_be_as_thin_as_none():
+    """Masses below rounding left bands without a width to the modes of a second block."""
+    plate = fi.analytic.rectangle(0.3, 0.2, mass=0.486, first_frequency=260.0, n_modes=60)
+    thin = fi.in_air(plate, density=1e-15)
+    assert np.isfinite(thin.damping_error).all() and thin.omega == pytest.approx(plate.omega, rel=1e-12)
+
+
 def test_pairs_at_one_frequency_are_damped_as_surely_as_others():
     """Both modes of a pair came out as one where they shared the frequency to rounding: errors of 50 to 200 %."""
     disk = fi.analytic.disk(0.2, edge="clamped", mass=0.34, first_frequency=63.3, n_modes=5)
